@@ -11,12 +11,12 @@ import typer
 from rbdyn.base import command
 from rbdyn.base.blocks import Block, Detail, Paragraph, Table, with_notes
 from rbdyn.base.command import Console, Delivery, result_command
-from rbdyn.base.faults import InputError, axis_values
+from rbdyn.base.faults import InputError, assignment_faults, axis_values, key_path, refuse
 from rbdyn.base.folder import output_folder
 from rbdyn.base.identity import identity_of
 from rbdyn.base.page import REPORT_FILES
 from rbdyn.base.terminal import show as show_blocks
-from rbdyn.base.words import counted
+from rbdyn.base.words import counted, label
 from rbdyn.cli.ball import ball
 from rbdyn.cli.compare import compare
 from rbdyn.cli.manual import describe_keys, manual
@@ -173,14 +173,17 @@ def accuracy(
 
 
 def map_blocks(mapped: "SlipMap", duty: "MapDuty | None" = None) -> list[Block]:
-    """Cage slip and class of the cage over speed and load, what it cost, and the points of a duty."""
-    header = ("load [N]", *(f"{value:g} rpm" for value in mapped.speeds_rpm))
+    """Cage slip and class of the cage over both axes, what it cost, and the points of a duty."""
+    from rbdyn.dynamics.slip_map import axis_value
+
+    along, up = mapped.axes
+    header = (label(up.rpartition(".")[2]), *(axis_value(along, value) for value in mapped.columns))
     rows = [
         (f"{value:g}", *(f"{100.0 * slip:.3g} %" if slip == slip else "failed" for slip in row))
-        for value, row in zip(mapped.loads_N, mapped.grid("cage_slip"), strict=True)
+        for value, row in zip(mapped.rows, mapped.grid("cage_slip"), strict=True)
     ]
     spent = f"{counted(len(mapped.points), 'point')} in {mapped.wall_s:.1f} s, seed {mapped.seed}"
-    cages = [(f"{value:g}", *row) for value, row in zip(mapped.loads_N, mapped.cages, strict=False)]
+    cages = [(f"{value:g}", *row) for value, row in zip(mapped.rows, mapped.cages, strict=False)]
     classes = Table("Class of the cage by its orbit, with the replicates that have it", header, cages)
     answer = [Table("Cage slip", header, rows), classes, Paragraph(spent), *(duty.blocks if duty else [])]
     return with_notes((*mapped.notes, *(duty.notes if duty else ())), answer)
@@ -216,8 +219,14 @@ def _map_record(mapped: "SlipMap", duty: "MapDuty | None") -> dict[str, Any]:
 def slip_map(
     console: Console,
     scene: command.SceneFile,
-    speed: Annotated[str, typer.Option(metavar="RPM", help="Inner speeds: start:stop:count or a,b,c.")],
-    load: Annotated[str, typer.Option(metavar="N", help="Radial loads: start:stop:count or a,b,c.")],
+    speed: Annotated[str | None, command.valued("RPM", "Inner speeds: start:stop:count or a,b,c.", "one")] = None,
+    load: Annotated[str | None, command.valued("N", "Radial loads, written alike.", "one")] = None,
+    sweep: Annotated[
+        list[str] | None,
+        command.valued(
+            "KEY=VALUES", "Any other key, instead of speed or load; repeatable.", "speed and load", "--sweep"
+        ),
+    ] = None,
     duty: Annotated[
         Path | None,
         command.valued("FILE", "Mark its points of operation: TOML such as a study, or CSV.", "no marks", "--duty"),
@@ -242,28 +251,31 @@ def slip_map(
     seed: command.Seed = None,
     workers: command.Workers = None,
 ) -> Delivery:
-    """Map cage slip, power loss, impact, whirl and class of the cage over speed and load, or the stiffness."""
+    """Map cage slip, power loss, impact, whirl and class of the cage over two keys, or the stiffness over speed and load."""
+    swept = _map_axes(speed, load, sweep or [])
+    (along, columns), (up, rows) = swept.items()
+    if (along, up) != AXES and (stiffness or duty):
+        raise InputError(
+            [f"--sweep {' '.join(sweep or [])}: --stiffness and --duty need a map over --speed and --load; state these"]
+        )
     if stiffness:
         if duty is not None:
             raise InputError([f"--duty {duty}: marks points of a map of cage slip; leave it or --stiffness out"])
         from rbdyn.cli.stiffness import over_speed
 
         chosen = Scene.load(scene, _with_numerics(assignments, turns=turns, replicates=replicates, seed=seed))
-        return over_speed(console, scene, chosen, (axis_values(speed, "--speed"), axis_values(load, "--load")), load_angle,
-                          loss_factor, workers)  # fmt: skip
+        return over_speed(console, scene, chosen, (columns, rows), load_angle, loss_factor, workers)
     if load_angle or loss_factor:
         raise InputError(["--load-angle, --loss-factor: belong to --stiffness; state that too, or leave them out"])
     loaded = _rollers(scene, assignments, turns=turns, replicates=replicates, seed=seed)
     from rbdyn.dynamics.slip_map import slip_map as run_map
 
-    axes = axis_values(speed, "--speed"), axis_values(load, "--load")
-    marked = _map_duty(loaded, duty, *axes)
+    marked = _map_duty(loaded, duty, columns, rows)
     console.folder.claim(scene)
     points = console.folder.path / MAP_POINTS if console.folder.path else None
     with command.checkpoint_message(points), console.progress("mapping") as progress:
-        mapped = run_map(loaded, *axes, workers, progress, points, console.notice)
+        mapped = run_map(loaded, columns, rows, workers, progress, points, console.notice, (along, up))
     inputs = [scene] if duty is None else [scene, duty]
-    swept = dict(zip(AXES, axes, strict=True))
     return Delivery(
         identity_of("rbdyn map", loaded.model_dump(mode="json"), inputs, swept=swept),
         partial(_map_record, mapped, marked),
@@ -274,9 +286,25 @@ def slip_map(
     )
 
 
+def _map_axes(speed: str | None, load: str | None, others: Sequence[str]) -> dict[str, list[float]]:
+    """Values of the two axes of a map by key, speed first and load last. Raises InputError with all faults of their keys."""
+    refuse(assignment_faults("--sweep", others, {("numerics",): "belongs to all points; state it by --set"}))
+    stated = [(AXES[0], speed, "--speed")] if speed is not None else []
+    stated += [
+        (".".join(key_path(text)), text.partition("=")[2], f"--sweep {text.partition('=')[0]}") for text in others
+    ]
+    stated += [(AXES[1], load, "--load")] if load is not None else []
+    if len({key for key, *_ in stated}) != 2 or len(stated) != 2:
+        raise InputError(
+            [f"--speed, --load, --sweep: a map has two axes, and {len(stated)} are stated; state two different ones"]
+        )
+    stated.sort(key=lambda entry: (entry[0] == AXES[1]) - (entry[0] == AXES[0]))
+    return {key: axis_values(values, option) for key, values, option in stated}
+
+
 def _print_failed(mapped: "SlipMap") -> None:
     for point in mapped.failed:
-        print(f"{point.inner_speed_rpm:g} rpm, {point.radial_load_N:g} N {point.status}", file=sys.stderr)
+        print(f"{point.place(mapped.axes)}: {point.status}", file=sys.stderr)
 
 
 def _map_duty(

@@ -1,9 +1,10 @@
-"""Cage slip, loss, whirl and impact over speed and load: where a bearing skids.
+"""Cage slip, loss, whirl, impact and class of the cage over speed and load, or any two keys: where a bearing skids, where its cage is held.
 
-Every point is the same scene at another inner speed and radial load, with [thermal] at its own steady temperatures. A point that cannot go on becomes a record of the
+Every point is the same scene with other values of two keys, with [thermal] at its own steady temperatures. A point that cannot go on becomes a record of the
 cause, and the others go on. A file may keep finished points, so that an interrupted map goes on there.
 """
 
+import itertools
 import time
 from collections import Counter
 from collections.abc import Iterable, Sequence
@@ -14,16 +15,15 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 
 from rbdyn.base.blocks import Column, Sheet
-from rbdyn.base.faults import MOST_VALUES, InputError, RunError
+from rbdyn.base.faults import MOST_VALUES, InputError, RunError, refuse
 from rbdyn.base.files import Checkpoint, code_version, run_key, versions
 from rbdyn.base.notes import Notes, status_of
 from rbdyn.base.records import Record, derived, keyed, nullable, spread
-from rbdyn.base.words import Notice, counted
+from rbdyn.base.words import Notice, counted, quantity
 from rbdyn.contact.hertz_line import ROLLERS, pressure_notes
 from rbdyn.dynamics.cage_verdict import verdict_of
 from rbdyn.dynamics.ensemble import Outcome, Pace, Reporter, Stop, in_turn, keys_of, log, plan_of, run_all, threads_of
 from rbdyn.dynamics.figures import DAMAGE, PANELS
-from rbdyn.dynamics.forces.equations import RollerBearing
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.parameters.validity import heat_notes, limit_notes
 from rbdyn.dynamics.part_figures import part_figures
@@ -35,6 +35,8 @@ from rbdyn.dynamics.statistics.metrics import Companions, companions_of
 from rbdyn.dynamics.statistics.replicate import Replicate
 from rbdyn.result import Quantity, cage_column, figure_columns
 from rbdyn.scene import Scene
+from rbdyn.scene.duty import AXES
+from rbdyn.scene.thermal import first_guess_faults
 from rbdyn.verdict.replicates import CageVerdict
 
 if TYPE_CHECKING:
@@ -42,11 +44,13 @@ if TYPE_CHECKING:
 
 FORMAT = "rbdyn.map/1"
 RACES = ("inner", "outer")
+# Keys of a point besides speed and load, with their values; None without any.
+At = dict[str, float] | None
 
 
 class Point(Record):
     """One speed and load; ``figures`` is empty where ``status`` shows why the run could not go on. ``notes``: on its limits.
-    ``verdict``: class of the cage by its orbit, None without one."""
+    ``verdict``: class of the cage by its orbit, None without one; ``at``: other keys that the map varies, with their values."""
 
     inner_speed_rpm: float
     radial_load_N: float  # noqa: N815
@@ -55,6 +59,22 @@ class Point(Record):
     power_gap: float | None = keyed("power_balance", "relative_gap")
     notes: Notes | None = None
     verdict: CageVerdict | None = nullable(default=None)
+    at: dict[str, float] | None = None
+
+    def place(self, keys: Iterable[str]) -> str:
+        """Values of keys of the map, such as "24000 rpm and 1300 N"."""
+        places = dict(zip(AXES, (self.inner_speed_rpm, self.radial_load_N), strict=True)) | (self.at or {})
+        return " and ".join(axis_value(key, places[key]) for key in keys)
+
+
+def axis_value(key: str, value: float) -> str:
+    """ "24000 rpm", or "pocket friction 0.1" where a key has no unit."""
+    words, unit = quantity(key.rpartition(".")[2])
+    return f"{value:g} {unit}" if unit else f"{words} {value:g}"
+
+
+def _key_column(key: str) -> Column[Point]:
+    return Column(key, at=lambda point: (point.at or {})[key])
 
 
 def map_sheet(points: Sequence[Point], figures: Iterable[str] = ()) -> Sheet[Point]:
@@ -62,23 +82,39 @@ def map_sheet(points: Sequence[Point], figures: Iterable[str] = ()) -> Sheet[Poi
     columns: tuple[Column[Point], ...] = (
         Column("inner_speed_rpm", meaning="operating point"),
         Column("radial_load_N"),
+        *map(_key_column, (points[0].at if points else None) or ()),
         *figure_columns(figures or dict.fromkeys(name for point in points for name in point.figures)),
         cage_column(),
+        Column(
+            "cage_share",
+            at=lambda point: point.verdict and point.verdict.largest_share,
+            meaning="share of bearings alike that have the commonest class of the replicates",
+        ),
         Column("power_gap", meaning="share of the power that the balance does not account for"),
         Column("status", meaning="ok, or why the point failed"),
     )
-    return Sheet("", columns, points, file="map.csv", content="One row per speed and load of `rbdyn map`.")
+    return Sheet(
+        "",
+        columns,
+        points,
+        file="map.csv",
+        content="One row per point of `rbdyn map`; other keys that it varies have columns of their own.",
+    )
 
 
 class SlipMap(Record):
-    """Points in rows of rising load, speeds rising in each row; ``wall_s``: their wall time."""
+    """Points in rows of rising values of the second of the ``axes``, values of the first rising in each row; ``wall_s``: their wall time.
+
+    ``axes``: values by key, speed as the first and load as the second where they are varied; ``speeds_rpm`` and ``loads_N`` state them again.
+    """
 
     format: str = derived(lambda self: FORMAT)
     status: str = derived(
         lambda self: f"{len(self.failed)} of {counted(len(self.points), 'point')} failed" if self.failed else "ok"
     )
-    speeds_rpm: tuple[float, ...]
-    loads_N: tuple[float, ...]  # noqa: N815
+    axes: dict[str, tuple[float, ...]]
+    speeds_rpm: tuple[float, ...] | None = derived(lambda self: self.axes.get(AXES[0]))
+    loads_N: tuple[float, ...] | None = derived(lambda self: self.axes.get(AXES[1]))  # noqa: N815
     points: tuple[Point, ...]
     wall_s: float = keyed("cost", "wall_s")
     seed: int
@@ -95,9 +131,7 @@ class SlipMap(Record):
         last = {note.code: (note, point) for point in self.points for note in point.notes or ()}
         count = Counter(code for point in self.points for code in {note.code for note in point.notes or ()})
         return tuple(
-            note.about(
-                f"at {point.inner_speed_rpm:g} rpm and {point.radial_load_N:g} N; at {count[code]} of {len(self.points)} points"
-            )
+            note.about(f"at {point.place(self.axes)}; at {count[code]} of {len(self.points)} points")
             for code, (note, point) in last.items()
         )
 
@@ -106,17 +140,27 @@ class SlipMap(Record):
         return map_sheet(self.points).frame
 
     @property
+    def columns(self) -> tuple[float, ...]:
+        """Values of the first axis."""
+        return next(iter(self.axes.values()))
+
+    @property
+    def rows(self) -> tuple[float, ...]:
+        """Values of the second axis."""
+        return [*self.axes.values()][1]
+
+    @property
     def cages(self) -> list[list[str]]:
-        """Class of the cage in rows of rising load with its replicates, "failed" without one; empty where the scene leaves it out."""
+        """Class of the cage in rows of the second axis with its replicates, "failed" without one; empty where the scene leaves it out."""
         cells = ["failed" if point.verdict is None else point.verdict.cell for point in self.points]
-        columns = len(self.speeds_rpm)
+        columns = len(self.columns)
         judged = any(point.verdict for point in self.points)
         return [cells[start : start + columns] for start in range(0, len(cells), columns)] if judged else []
 
     def grid(self, figure: str) -> np.ndarray[Any, np.dtype[np.float64]]:
-        """Values of a figure, shape (loads, speeds); NaN where a point failed."""
+        """Values of a figure, shape (rows, columns); NaN where a point failed."""
         values = [point.figures[figure].value if point.figures else np.nan for point in self.points]
-        return np.array(values).reshape(len(self.loads_N), len(self.speeds_rpm))
+        return np.array(values).reshape(len(self.rows), len(self.columns))
 
 
 @dataclass(frozen=True)
@@ -136,11 +180,12 @@ class Job:
 class Series:
     """Runs of the point at ``place``: its replicates, then companions by their steps; no companions where a replicate failed.
 
-    ``waiting``: runs begun that have not ended; ``remaining``: companions that have not begun.
+    ``at``: keys of the point besides speed and load; ``waiting``: runs begun that have not ended; ``remaining``: companions that have not begun.
     """
 
-    def __init__(self, place: int, scene: Scene, bearing: RollerBearing, stop: Stop, pace: Pace) -> None:
-        self.place, self.scene, self.bearing, self.stop, self.pace = place, scene, bearing, stop, pace
+    def __init__(self, place: int, at: At, scene: Scene, stop: Stop, pace: Pace) -> None:
+        self.place, self.at, self.scene, self.stop, self.pace = place, at, scene, stop, pace
+        self.bearing = roller_bearing(scene)
         self.waiting, self.remaining = scene.numerics.replicates, scene.numerics.companions
         self.plan: Companions | None = None
         self.runs: dict[tuple[Companions | None, int], Replicate] = {}
@@ -166,9 +211,8 @@ class Series:
 
     def point(self) -> Point:
         """Figures from the runs, or why there are none."""
-        speed, load = self.scene.operation.inner_speed_rpm, self.scene.operation.radial_load_N
         if self.faults:
-            return Point(speed, load, f"failed: {min(self.faults)}", {}, None)
+            return failed_point(self.scene, self.at, min(self.faults))
         share = 0.0 if self.plan is None else self.plan.share
         runs, companions, _ = after_transient(
             self.scene, self._ended(None), self._ended(self.plan) if self.plan else []
@@ -184,7 +228,8 @@ class Series:
         )
         damage = {figure.key: figures[figure.key] for figure in DAMAGE if figure.key in figures}
         shown = {panel.key: figures[panel.key] for panel in PANELS} | damage | parts
-        return Point(speed, load, status_of(notes), shown, power_gap, notes or None, verdict_of(self.scene, runs))
+        speed, load, found = *_place(self.scene), verdict_of(self.scene, runs)
+        return Point(speed, load, status_of(notes), shown, power_gap, notes or None, found, self.at)
 
     def _ended(self, plan: Companions | None) -> list[Replicate]:
         return [run for (of, _), run in sorted(self.runs.items(), key=lambda item: item[0][1]) if of == plan]
@@ -192,26 +237,33 @@ class Series:
 
 def slip_map(
     scene: Scene,
-    speeds_rpm: Sequence[float],
-    loads_N: Sequence[float],  # noqa: N803
+    columns: Sequence[float],
+    rows: Sequence[float],
     workers: int | None = None,
     progress: Reporter = None,
     kept_in: Path | None = None,
     notice: Notice = log,
+    keys: tuple[str, str] = AXES,
 ) -> SlipMap:
-    """Run the scene at every pair of inner speed and radial load, except for points in the file ``kept_in``.
+    """Run the scene at every pair of values of two ``keys``, inner speed and radial load by default, except for points in the file ``kept_in``.
 
     ``notice``: called with a sentence on long runs, as in ``simulate``.
-    Raises InputError where a speed or load is impossible or the scene has a schedule, KeyboardInterrupt on Ctrl-C.
+    Raises InputError where a key or a value is impossible or the scene has a schedule, KeyboardInterrupt on Ctrl-C.
     """
     if scene.operation.schedule is not None:
         raise InputError(["operation.schedule: a map sets speed and load itself; take the schedule away"])
-    if (count := len(speeds_rpm) * len(loads_N)) > MOST_VALUES:
-        raise InputError([f"--speed, --load: {count} points are more than the {MOST_VALUES} kept at once; take fewer"])
-    scenes = [_scene_at(scene, speed, load) for load in loads_N for speed in speeds_rpm]
+    refuse(first_guess_faults(scene.thermal, scene.lubricant, keys))
+    if (count := len(columns) * len(rows)) > MOST_VALUES:
+        raise InputError(
+            [f"{', '.join(keys)}: {count} points are more than the {MOST_VALUES} kept at once; take fewer"]
+        )
+    places = [dict(zip(keys, place, strict=True)) for place in itertools.product(columns, rows)]
+    places.sort(key=lambda place: place[keys[1]])
+    scenes = [scene.overridden([f"{key}={value:.17g}" for key, value in place.items()]) for place in places]
+    at: list[At] = [{key: value for key, value in place.items() if key not in AXES} or None for place in places]
     store, version = Checkpoint(kept_in), code_version("rbdyn.dynamics.simulate", __name__)
-    keys = [run_key(point.model_dump(mode="json"), version) for point in scenes]
-    points = {place: Point.from_dict(record) for place, key in enumerate(keys) if (record := store.get(key))}
+    digests = [run_key(point.model_dump(mode="json"), version) for point in scenes]
+    points = {place: Point.from_dict(record) for place, key in enumerate(digests) if (record := store.get(key))}
     numerics, stop, threads = scene.numerics, Stop(), threads_of(workers)
     missing = len(scenes) - len(points)
     # Threads that become free take runs of the next point.
@@ -223,21 +275,18 @@ def slip_map(
         turns += missing * heat
     if notice is not None:
         notice(plan_of(scene, threads, missing))
-    pace = Pace(notice, turns, first, threads, ["the values of --speed and --load", *keys_of(scene)])
+    pace = Pace(notice, turns, first, threads, ["the values of the map's axes", *keys_of(scene)])
     for place, point in enumerate(scenes if scene.thermal is not None else ()):
         hot = _at_temperatures(point, workers, stop, pace) if place not in points else point
         if isinstance(hot, str):
-            points[place] = Point(
-                point.operation.inner_speed_rpm, point.operation.radial_load_N, f"failed: {hot}", {}, None
-            )
-            store.put(keys[place], points[place].as_dict())
+            points[place] = failed_point(point, at[place], hot)
+            store.put(digests[place], points[place].as_dict())
         else:
             scenes[place] = hot
-    bearings = {place: roller_bearing(point) for place, point in enumerate(scenes) if place not in points}
-    for place in list(bearings)[:1]:
-        prepare(scenes[place], bearings[place])
-    total, ended = len(bearings) * (numerics.replicates + numerics.companions), 0
-    series = [Series(place, scenes[place], bearings[place], stop, pace) for place in bearings]
+    series = [Series(place, at[place], point, stop, pace) for place, point in enumerate(scenes) if place not in points]
+    for one in series[:1]:
+        prepare(one.scene, one.bearing)
+    total, ended = len(series) * (numerics.replicates + numerics.companions), 0
 
     def collect(outcome: Outcome[Replicate]) -> list[Job]:
         nonlocal ended
@@ -247,7 +296,7 @@ def slip_map(
         if not point.waiting:
             ended += point.remaining
             points[point.place] = point.point()
-            store.put(keys[point.place], points[point.place].as_dict())
+            store.put(digests[point.place], points[point.place].as_dict())
         if progress is not None:
             progress(ended, total)
         return more
@@ -256,7 +305,8 @@ def slip_map(
     run_all((job for one in series for job in one.replicates()), workers, stop, collect)
     wall_s = time.perf_counter() - started
     ordered = tuple(points[place] for place in range(len(scenes)))
-    return SlipMap(tuple(speeds_rpm), tuple(loads_N), ordered, wall_s, scene.numerics.seed)
+    axes = dict(zip(keys, (tuple(columns), tuple(rows)), strict=True))
+    return SlipMap(axes, ordered, wall_s, scene.numerics.seed)
 
 
 def _at_temperatures(scene: Scene, workers: int | None, stop: Stop, pace: Pace) -> Scene | str:
@@ -267,7 +317,10 @@ def _at_temperatures(scene: Scene, workers: int | None, stop: Stop, pace: Pace) 
         return str(error)
 
 
-def _scene_at(scene: Scene, speed: float, load: float) -> Scene:
-    data = scene.model_dump(mode="json", exclude_none=True)
-    data["operation"] |= {"inner_speed_rpm": speed, "radial_load_N": load}
-    return Scene.from_dict(data, f"--speed {speed:g} --load {load:g}")
+def failed_point(scene: Scene, at: At, fault: str) -> Point:
+    """A point that cannot go on."""
+    return Point(*_place(scene), f"failed: {fault}", {}, None, at=at)
+
+
+def _place(scene: Scene) -> tuple[float, float]:
+    return scene.operation.inner_speed_rpm, scene.operation.radial_load_N

@@ -294,11 +294,10 @@ def draw_slip_map(
 
     ``marks``: speed [rpm] and load [N] of points to mark, by their names; between cells they are at their places by straight lines.
     """
-    speeds, loads = slip_map.speeds_rpm, slip_map.loads_N
-    width = max(4.2, 0.85 * len(speeds) + 2.0)
+    width = max(4.2, 0.85 * len(slip_map.columns) + 2.0)
     count = len(PANELS) + bool(slip_map.cages)
     rows = math.ceil(count / 2)
-    figure, axes = plt.subplots(rows, 2, figsize=(2.0 * width, rows * max(3.2, 0.5 * len(loads) + 1.8)))
+    figure, axes = plt.subplots(rows, 2, figsize=(2.0 * width, rows * max(3.2, 0.5 * len(slip_map.rows) + 1.8)))
     for axis in axes.ravel()[count:]:
         axis.set_axis_off()
     for axis, panel in zip(axes.ravel(), PANELS, strict=False):
@@ -320,22 +319,23 @@ def draw_slip_map(
 
 
 def _label_axes(axis: Axes, slip_map: "SlipMap", title: str) -> None:
-    axis.set_xticks(range(len(slip_map.speeds_rpm)), [f"{speed:g}" for speed in slip_map.speeds_rpm])
-    axis.set_yticks(range(len(slip_map.loads_N)), [f"{load:g}" for load in slip_map.loads_N])
-    axis.set(xlabel="inner speed [rpm]", ylabel="radial load [N]", title=title)
+    axis.set_xticks(range(len(slip_map.columns)), [f"{value:g}" for value in slip_map.columns])
+    axis.set_yticks(range(len(slip_map.rows)), [f"{value:g}" for value in slip_map.rows])
+    along, up = (label(key.rpartition(".")[2]) for key in slip_map.axes)
+    axis.set(xlabel=along, ylabel=up, title=title)
 
 
 def _draw_classes(axis: Axes, slip_map: "SlipMap", below: float) -> None:
-    """Cells in the colour of the class of their cage, with its name and replicates."""
+    """Cells in the colour of the class of their cage, with its name, replicates, and the share of the commonest class."""
     names = [point.verdict.name if point.verdict else "" for point in slip_map.points]
     colours = np.array([to_rgb(CAGE_COLOURS.get(name, "white")) for name in names])
-    axis.imshow(
-        colours.reshape(len(slip_map.loads_N), len(slip_map.speeds_rpm), 3), origin="lower", aspect="auto", alpha=0.5
-    )
+    axis.imshow(colours.reshape(len(slip_map.rows), len(slip_map.columns), 3), origin="lower", aspect="auto", alpha=0.5)
     for row, cells in enumerate(slip_map.cages):
         for column, text in enumerate(cells):
-            axis.text(column, row - below, text.replace(", ", "\n"), ha="center", va="center", fontsize=8)
-    _label_axes(axis, slip_map, "class of the cage by its orbit")
+            found = slip_map.points[row * len(slip_map.columns) + column].verdict
+            share = "" if found is None or found.largest_share is None else f"\n{found.largest_share:.2f}"
+            axis.text(column, row - below, text.replace(", ", "\n") + share, ha="center", va="center", fontsize=8)
+    _label_axes(axis, slip_map, "class of the cage, and its share of bearings alike")
 
 
 # Clearances of a picture over the operating or the drawn one, whichever is larger, and how many of them.
@@ -397,13 +397,13 @@ def _mark_points(axis: Axes, slip_map: "SlipMap", marks: Mapping[str, tuple[floa
     for name, place in marks.items():
         names.setdefault(place, []).append(name)
     for (speed, load), together in names.items():
-        column = float(np.interp(speed, slip_map.speeds_rpm, range(len(slip_map.speeds_rpm))))
-        row = float(np.interp(load, slip_map.loads_N, range(len(slip_map.loads_N))))
+        column = float(np.interp(speed, slip_map.columns, range(len(slip_map.columns))))
+        row = float(np.interp(load, slip_map.rows, range(len(slip_map.rows))))
         axis.plot(
             [column], [row], marker="D", markersize=6.0, color=VERMILION, markeredgecolor="white", linestyle="none"
         )
         # The name is on the side with more room.
-        side, shift = ("right", -7.0) if column > 0.5 * (len(slip_map.speeds_rpm) - 1) else ("left", 7.0)
+        side, shift = ("right", -7.0) if column > 0.5 * (len(slip_map.columns) - 1) else ("left", 7.0)
         axis.annotate(
             ", ".join(together), (column, row), (shift, 9.0), textcoords="offset points", ha=side, va="center",
             fontsize=8, color="black", bbox={"boxstyle": "round,pad=0.2", "fc": "white", "ec": VERMILION, "lw": 0.8},

@@ -90,6 +90,11 @@ class CageVerdict(Record):
             return ", ".join(f"{name} {count}" for name, count in self.replicates.items())
         return f"{self.name} {self.replicates[self.name]}/{total}" if self.name in self.replicates else self.name
 
+    @property
+    def largest_share(self) -> float | None:
+        """Share of bearings alike that have the commonest class; None without replicates."""
+        return max((share.mean for share in self.shares.values()), default=None)
+
     def share_of(self, names: Collection[str]) -> float:
         """Share of bearings alike whose class is one of these; 0 without replicates."""
         total = sum(self.replicates.values())

@@ -13,11 +13,13 @@ import footprint
 import numpy as np
 import pytest
 from conftest import lacking
+from in_process import in_process
 
 from rbdyn import accuracy
 from rbdyn.accuracy.variants import OPTIONS, option_costs, study_options, with_options
 from rbdyn.base.faults import InputError, axis_values
-from rbdyn.cli.app import MAP_POINTS
+from rbdyn.base.terminal import text as terminal_text
+from rbdyn.cli.app import MAP_POINTS, map_blocks
 from rbdyn.cli.app import _write_map as write
 from rbdyn.dynamics.slip_map import PANELS, slip_map
 from rbdyn.scene import Scene
@@ -202,6 +204,47 @@ def test_unit_map_refuses_a_schedule(make_scene):
     scene = make_scene("operation.schedule={time_s=[0.0],radial_load_N=[100.0]}")
     with pytest.raises(InputError, match=r"operation\.schedule"):
         slip_map(scene, SPEEDS, LOADS)
+
+
+def test_unit_a_map_over_other_keys_is_what_single_runs_give(outer, tmp_path, drawn):
+    """Unit: figures and class of a point are those of its scene; tables, picture and screen name both keys."""
+    from rbdyn.dynamics.simulate import simulate
+
+    scene = with_options(outer, ("numerics.replicates=2", "numerics.turns=30"))
+    keys = ("model.pocket_friction", "cage.pocket_clearance_mm")
+    found = slip_map(scene, (0.05, 0.1), (0.2, 0.3), notice=None, keys=keys)
+    point = found.points[1]
+    assert point.at == {"model.pocket_friction": 0.1, "cage.pocket_clearance_mm": 0.2}
+    alone = simulate(with_options(scene, [f"{key}={value}" for key, value in point.at.items()]), notice=None)
+    assert point.figures["power_loss_W"] == alone.power_loss_W and point.verdict == alone.verdict
+    write(found, None, tmp_path)
+    assert found.as_dict()["axes"] == dict(zip(keys, ([0.05, 0.1], [0.2, 0.3]), strict=True))
+    assert found.as_dict()["speeds_rpm"] is None
+    assert list(found.table()[keys[0]]) == [0.05, 0.1, 0.05, 0.1] and list(found.table()["cage_share"]) == [
+        pytest.approx(max(share.mean for share in one.verdict.shares.values())) for one in found.points
+    ]
+    screen = terminal_text(map_blocks(found), width=200)
+    assert "pocket clearance [mm]" in screen and "pocket friction 0.1" in screen and point.verdict.cell in screen
+    assert not lacking(drawn["map.png"], found.grid("power_loss_W"))
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (("--speed", "1000"), "a map has two axes, and 1 are stated"),
+        (("--load", "1", "--sweep", "operation.radial_load_N=1"), "state two different ones"),
+        (("--speed", "1", "--sweep", "numerics.turns=1,2"), "'numerics.turns=1,2': belongs to all points"),
+        (("--speed", "1", "--sweep", "mass"), "--sweep = 'mass': write it as key.path=value"),
+        (("--speed", "1", "--sweep", "cage.mass_g=2,1"), "--sweep cage.mass_g 2,1: the values must rise"),
+        (("--speed", "9000", "--sweep", "cage.mass=2"), "cage.mass: unknown key"),
+        (("--speed", "9000", "--sweep", "cage.guidance=1"), "choose one of 'outer', 'inner' or 'roller'"),
+        (("--speed", "1", "--sweep", "cage.mass_g=2", "--stiffness"), "--stiffness and --duty need a map over --speed"),
+    ],
+)
+def test_command_map_names_what_is_wrong_with_its_axes(options, words):
+    """Command line: one sentence, before anything runs."""
+    done = in_process("rbdyn", "map", EXAMPLE, *options)
+    assert (done.returncode, words in done.stderr) == (2, True), done.stderr
 
 
 def test_command_map(command, tmp_path):

@@ -17,7 +17,7 @@ from rbdyn.dynamics.duty import static_life
 from rbdyn.dynamics.slip_map import PANELS, Point, SlipMap
 from rbdyn.life.duty import life_notes
 from rbdyn.result import Quantity
-from rbdyn.scene.duty import duty_scenes, read_duty
+from rbdyn.scene.duty import AXES, duty_scenes, read_duty
 
 SPEEDS, LOADS = (6000.0, 12000.0, 24000.0), (150.0, 1300.0)
 DUTY = """
@@ -49,7 +49,7 @@ def mapped() -> SlipMap:
     """A map of made-up figures."""
     figures = {name: Quantity(0.5, 0.1, 0.0, 10.0) for name in (panel.key for panel in PANELS)}
     points = tuple(Point(speed, load, "ok", figures, 0.0) for load in LOADS for speed in SPEEDS)
-    return SlipMap(SPEEDS, LOADS, points, 1.0, 1)
+    return SlipMap(dict(zip(AXES, (SPEEDS, LOADS), strict=True)), points, 1.0, 1)
 
 
 def test_unit_points_have_their_lives_and_notes(outer, path):
