@@ -23,6 +23,7 @@ from rbdyn.base.records import finite
 from rbdyn.dynamics.figures import FIGURES
 from rbdyn.result import Quantity, SimulationResult, arrays_of
 from rbdyn.scene import Scene
+from rbdyn.verdict.replicates import CageVerdict
 
 if TYPE_CHECKING:
     from doe.emulator import NoisyValues
@@ -356,6 +357,12 @@ class DutyResult:
 
 
 Simulated = SimulationResult | DutyResult
+
+
+def cages_of(result: Simulated) -> dict[str, CageVerdict]:
+    """Verdict on the cage by point of the duty, or under "operation"; empty where its scene leaves it out."""
+    results = result.points if isinstance(result, DutyResult) else {"operation": result}
+    return {name: run.verdict for name, run in results.items() if run.verdict is not None}
 
 
 def result_of(

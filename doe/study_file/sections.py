@@ -257,7 +257,8 @@ class CageLimit(Strict):
 
     verdict: Annotated[str, AfterValidator(_classes)] | None = None
     """Classes that the cage may have by its orbit, such as "held|circling", at every point of a duty. The simulated pick keeps the limit
-    where its replicates name one of them, and breaks it where they name another."""
+    where its replicates name one of them, and breaks it where they name another. With --robust its probability over the unknown inputs is
+    the mean part of the replicates of the input sets that have one of them."""
 
 
 class OtherLimits(Strict):
@@ -270,6 +271,11 @@ class OtherLimits(Strict):
     def classes(self) -> tuple[str, ...]:
         """Classes that the cage may have; empty without a limit."""
         return tuple(split_classes(self.cage.verdict or ""))
+
+    @property
+    def share_of_classes(self) -> str:
+        """Name of the share of bearings alike whose cage has one of the classes."""
+        return f"cage_{'_or_'.join(self.classes).replace(' ', '_')}_share"
 
 
 class StudyChain(Consistent):

@@ -11,7 +11,7 @@ from typing import Literal
 import numpy as np
 
 from doe.clearance import Simulations
-from doe.duty import DutyResult, Simulated
+from doe.duty import DutyResult, Simulated, cages_of
 from doe.running.store import Failure
 from doe.unknown.propagation import Share
 from doe.workflow.problem import Problem
@@ -90,9 +90,7 @@ class Confirmed:
     @property
     def cages(self) -> dict[str, CageVerdict]:
         """Verdict on the cage by point of the duty, or under "operation"; empty where its scene leaves it out."""
-        result = self.result
-        results = result.points if isinstance(result, DutyResult) else {"operation": result}
-        return {name: run.verdict for name, run in results.items() if run is not None and run.verdict is not None}
+        return {} if self.result is None else cages_of(self.result)
 
     @property
     def dangers(self) -> Notes:
@@ -356,7 +354,7 @@ def class_limits(study: Problem, confirmed: Confirmed) -> list[Limit]:
         kept, share = found.is_one_of(classes), round(found.share_of(classes), 3)
         limits.append(
             Limit(
-                response=f"cage_{'_or_'.join(classes).replace(' ', '_')}_share",
+                response=study.file.limits.share_of_classes,
                 bound=found.least_share,
                 sense=">=",
                 value=share,

@@ -13,7 +13,7 @@ from scipy.stats import t as student
 
 from doe import clearance
 from doe.clearance import Simulations, work_of
-from doe.duty import Duty, Run, Simulated, over_points
+from doe.duty import Duty, Run, Simulated, cages_of, over_points
 from doe.emulator import NoisyValues
 from doe.running.store import Failure, sentence
 from doe.unknown import inputs as unknown
@@ -53,7 +53,7 @@ class Sets:
     """Input sets with results, and the failures of the others.
 
     ``places`` (n,) in the plan, quantiles (n, d) and values of the inputs, outputs (n, m). ``impossible``: why a scene could not
-    be built.
+    be built. ``cages`` (n,): part of the replicates whose cage has one of the classes of the case, at the worst point of a duty.
     """
 
     places: Whole
@@ -62,6 +62,7 @@ class Sets:
     outputs: NoisyValues
     failures: tuple[Failure, ...]
     impossible: tuple[str, ...]
+    cages: Array
 
     @property
     def signals(self) -> Array:
@@ -81,6 +82,7 @@ class Sets:
             self.outputs.at(ours).averaged(other.outputs.at(theirs)),
             (*self.failures, *other.failures),
             self.impossible,
+            0.5 * (self.cages[ours] + other.cages[theirs]),
         )
 
 
@@ -90,6 +92,7 @@ class Case:
 
     ``sample``: columns of a posterior sample by key, with the ``doubt`` about it in a sentence. ``remarks``: sentences on
     keys that do not vary. ``home``: the file that declares the inputs. With a ``duty`` outputs are figures at its points.
+    ``classes``: that a study allows its cage.
     """
 
     source: str
@@ -103,6 +106,7 @@ class Case:
     remarks: Notes = ()
     home: str = ""
     duty: Duty | None = None
+    classes: tuple[str, ...] = ()
 
     def scenes(
         self,
@@ -435,7 +439,9 @@ def run(
     outputs = outputs_with_scatter(case.outputs, [result for _, result in successes])
     places = np.array([place for place, _ in successes], dtype=np.int64)
     inputs_there = [values[place] for place in places]
-    return Sets(places, quantiles[places], inputs_there, outputs, failures, impossible)
+    verdicts = [cages_of(result).values() for _, result in successes]
+    cages = np.array([min((found.part_of(case.classes) for found in each), default=0.0) for each in verdicts])
+    return Sets(places, quantiles[places], inputs_there, outputs, failures, impossible, cages)
 
 
 def replicated_sets(case: Case, quantiles: Array, simulations: Simulations, effort: int) -> Sets:

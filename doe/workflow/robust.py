@@ -37,8 +37,10 @@ from doe.workflow.input_sets import (
 from doe.workflow.judgement import ConfirmedGain, Decider, Decision, GainPoint, Pair, Robust, RobustFront, worded
 from doe.workflow.problem import Problem
 from rbdyn.base.arrays import Array, Whole, one_thread
-from rbdyn.base.faults import refuse, set_key
+from rbdyn.base.estimate import wilson
+from rbdyn.base.faults import InputError, refuse, set_key
 from rbdyn.scene.unknown import Input, UnknownInput, is_number
+from rbdyn.verdict.orbits import BLOCK_TURNS
 
 
 @dataclass(frozen=True)
@@ -47,12 +49,14 @@ class Pairs:
 
     ``places`` (n,) of the sets in the plan, their quantiles (n, d), and the outputs (p, n, m).
     ``effort`` (n,): replicates over those of the first runs. Over a ``duty`` outputs are figures at its points.
+    ``cages`` (p, n): part of the replicates whose cage has a class that the study allows.
     """
 
     places: Whole
     quantiles: Array
     outputs: NoisyValues
     effort: Whole
+    cages: Array
     duty: Duty | None = None
 
     @cached_property
@@ -68,15 +72,17 @@ class Pairs:
     def rows(self, rows: Whole) -> "Pairs":
         """The same at these rows; a row may come more than once."""
         outputs = self.outputs.at((slice(None), rows))
-        return Pairs(self.places[rows], self.quantiles[rows], outputs, self.effort[rows], self.duty)
+        places, cages = self.places[rows], self.cages[:, rows]
+        return Pairs(places, self.quantiles[rows], outputs, self.effort[rows], cages, self.duty)
 
     def joined(self, rows: Whole, other: "Pairs") -> "Pairs":
         """The same with as many replicates more at these rows."""
-        outputs, effort = deepcopy(self.outputs), self.effort.copy()
+        outputs, effort, cages = deepcopy(self.outputs), self.effort.copy(), self.cages.copy()
         for array, means in zip(outputs, outputs.at((slice(None), rows)).averaged(other.outputs), strict=True):
             array[:, rows] = means
         effort[rows] *= 2
-        return replace(self, outputs=outputs, effort=effort)
+        cages[:, rows] = 0.5 * (cages[:, rows] + other.cages)
+        return replace(self, outputs=outputs, effort=effort, cages=cages)
 
     def gains(self, goals: Goals, design: int = 1) -> tuple[Array, Array]:
         """Relative gains (n, q) of a design over the first, and their variances.
@@ -120,7 +126,8 @@ def simulate_designs(
     outputs = NoisyValues.stacked([sets.outputs.at(np.isin(sets.places, places)) for sets in sets_of_design])
     failures = tuple(failure for sets in sets_of_design for failure in sets.failures)
     effort = np.ones(len(places), dtype=np.int64)
-    return Pairs(places, quantiles[places], outputs, effort, case.duty), failures
+    cages = np.array([sets.cages[np.isin(sets.places, places)] for sets in sets_of_design])
+    return Pairs(places, quantiles[places], outputs, effort, cages, case.duty), failures
 
 
 JOINT_SEEDS = 200_000
@@ -213,7 +220,8 @@ def _emulators(
     cover = factors + case.uncertain.inputs, required
     positions = np.hstack([places, sets.quantiles])
     outputs = NoisyValues.stacked([base.outputs.at(0), sets.outputs])
-    designs = Pairs(sets.places, positions, outputs, np.ones_like(sets.places), base.duty).responses
+    effort, cages = np.ones_like(sets.places), np.array([base.cages[0], sets.cages])
+    designs = Pairs(sets.places, positions, outputs, effort, cages, base.duty).responses
     columns = zip(*(array.T for array in relative_gains(goals, designs)), strict=True)
     gain = [emulated(Runs(positions, *column), *cover, logarithms=False) for column in columns]
     limit_emulators = [
@@ -371,9 +379,13 @@ def _pairs_in_rounds(
 
 
 def limit_odds(study: Problem, pairs: Pairs, seed: int) -> dict[str, Share]:
-    """By limited response, the probability that the pick, the second design, keeps its limits over the unknown inputs."""
-    goals = study.goals
-    return {
+    """By limited response, the probability that the pick, the second design, keeps its limits over the unknown inputs.
+
+    That of the class of the cage is the mean part of the replicates that have one, with Wilson's interval of as many cases as input sets.
+    """
+    goals, limits, kept = study.goals, study.file.limits, float(pairs.cages[1].mean())
+    of_class = {limits.share_of_classes: Share(kept, *wilson(kept, len(pairs.places)))} if limits.classes else {}
+    return of_class | {
         study.responses[index]: odds(*pairs.values(index), float(goals.lower[index]), float(goals.upper[index]), seed)
         for index in sorted({index for index, _, _ in goals.limited})
     }
@@ -393,7 +405,15 @@ def case_of_study(study: Problem) -> Case:
     if duty is not None:
         case = replace(case, outputs=tuple(duty.columns), duty=duty)
         refuse(impossible(case))
-    return case
+    classes, turns = study.file.limits.classes, case.scene_of_sets.cage_turns
+    if classes and turns < BLOCK_TURNS:
+        raise InputError(
+            [
+                f"{case.home}: uncertain.set: input sets of {turns:.3g} cage turns are shorter than the {BLOCK_TURNS} that limits.cage.verdict "
+                "needs; set numerics.turns there to more"
+            ]
+        )
+    return replace(case, classes=classes)
 
 
 def _decision_by_keys(case: Case, inputs: Sequence[Input], analysis: DecisiveInputs) -> tuple[Pair | None, Decision]:

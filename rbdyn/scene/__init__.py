@@ -477,6 +477,11 @@ class Scene(SceneFile):
         return 2.0 * math.pi / (SAMPLES_A_TURN * speed) if speed > SLOWEST_CAGE else None
 
     @property
+    def cage_turns(self) -> float:
+        """Turns of a cage without slip in the counted turns of a run."""
+        return self.numerics.turns * self.turn_s * abs(self.geometry.motion.cage_speed) / (2.0 * math.pi)
+
+    @property
     def guide_play_m(self) -> float | None:
         """Diametral guide clearance in operation [m], also where the land is off; None without a guide."""
         mounted = self.cage_clearances

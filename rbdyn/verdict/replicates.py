@@ -100,6 +100,11 @@ class CageVerdict(Record):
         total = sum(self.replicates.values())
         return _share(sum(self.replicates.get(name, 0) for name in names), total).mean if total else 0.0
 
+    def part_of(self, names: Collection[str]) -> float:
+        """Part of the replicates whose class is one of these; 0 where the classes are only noted."""
+        total = sum(self.replicates.values()) if self.name == self.rule else 0
+        return sum(self.replicates.get(name, 0) for name in names) / total if total else 0.0
+
     def is_one_of(self, names: Collection[str]) -> bool | None:
         """Whether the class is one of these; None where the share of neither these nor the others is large enough, or none is judged."""
         others = [name for name in self.replicates if name not in names]

@@ -14,6 +14,7 @@ from typer.testing import CliRunner
 from doe.cli import app
 from doe.workflow.confirmation import Confirmed, class_limits, limits_of
 from doe.workflow.problem import Problem
+from doe.workflow.robust import case_of_study
 from rbdyn.base.faults import InputError
 from rbdyn.verdict.orbits import Forcing, Orbit, Thresholds
 from rbdyn.verdict.replicates import CageVerdict, Trial, cage_verdict
@@ -147,3 +148,45 @@ def test_a_study_compares_the_class_of_pick_and_baseline(tmp_path, monkeypatch, 
     assert limit["verdict"] == {0: "kept"}.get(code, "broken" if len(at_pick) == 1 else "undecided")
     assert record["status"] == ("ok" if code == 0 else limit["verdict"])
     assert record["confirmation"]["pick"]["cage"]["operation"]["class"] == found(**at_pick).name
+
+
+UNKNOWN = """
+[robust]
+points = 64
+settle = 0.0
+front = "none"
+[uncertain]
+defaults = "none"
+set = ["numerics.turns={turns}", "numerics.replicates=2"]
+"model.pocket_friction" = {{ law = "uniform", low = 0.0, high = 0.1 }}
+"""
+
+
+def test_unknown_inputs_give_the_class_its_probability(tmp_path, monkeypatch):
+    """A cage held below a friction of 0.03, of 0 to 0.1, keeps its limit with a probability of 0.3 to 0.02, over the input sets."""
+    instantly(monkeypatch.setattr)
+    unillustrated(monkeypatch.setattr)
+    from rbdyn.dynamics import simulate as module
+
+    usual, path = module.simulate, limited(tmp_path, "held")
+    path.write_text(path.read_text(encoding="utf-8") + UNKNOWN.format(turns=40), encoding="utf-8")
+
+    def simulate(scene, *rest, **more):
+        alone = scene.numerics.replicates > 2 or scene.model.pocket_friction < 0.03
+        verdict = found(held=scene.numerics.replicates) if alone else found(circling=1, fast_whirl=1)
+        return replace(usual(scene, *rest, **more), verdict=verdict)
+
+    monkeypatch.setattr(module, "simulate", simulate)
+    done = CliRunner().invoke(app, ["study", str(path), "--robust", "--json", "--out", str(tmp_path / "out")])
+    record = json.loads(done.stdout)
+    limit = record["limits"]["cage_held_share"]
+    assert limit["verdict"] == "kept"
+    value, low, high = limit["odds"]
+    assert value == pytest.approx(0.3, abs=0.02) and low < 0.22 and 0.4 < high < 0.45
+
+
+def test_input_sets_too_short_for_a_class_are_refused(tmp_path):
+    path = limited(tmp_path, "held")
+    path.write_text(path.read_text(encoding="utf-8") + UNKNOWN.format(turns=20), encoding="utf-8")
+    with pytest.raises(InputError, match=r"uncertain\.set: input sets of 7\.\d+ cage turns are shorter than the 10"):
+        case_of_study(Problem.load(path))
