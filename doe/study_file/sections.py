@@ -257,7 +257,8 @@ class CageLimit(Strict):
 
     verdict: Annotated[str, AfterValidator(_classes)] | None = None
     """Classes that the cage may have by its orbit, such as "held|circling", at every point of a duty. The simulated pick keeps the limit
-    where its replicates name one of them, and breaks it where they name another. With --robust its probability over the unknown inputs is
+    where its replicates name one of them, and breaks it where they name another. No surface has a class, so front and pick stay where the
+    cage of the nearest run keeps the limit. With --robust its probability over the unknown inputs is
     the mean part of the replicates of the input sets that have one of them."""
 
 

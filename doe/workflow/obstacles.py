@@ -216,7 +216,7 @@ def _cage_sentence(study: Problem, pick: Confirmed) -> str:
     where = {name: f" at {name}" if study.duty else "" for name in open_points}
     words = "; ".join(f"{found.words.removeprefix('Cage: ')}{where[name]}" for name, found in open_points.items())
     return (
-        f"Limit cage.verdict = {study.file.limits.cage.verdict}: the class of the pick's cage is {words}. No surface predicts its class: change "
+        f"Limit cage.verdict = {study.file.limits.cage.verdict}: the class of the pick's cage is {words}. No surface predicts a class: change "
         "the bearing, its load or its speed, or state other classes."
     )
 

@@ -26,6 +26,7 @@ from doe.workflow.confirmation import (
     Confirmed,
     Limit,
     LostPickError,
+    class_limits,
     confirm,
     confirmed_from,
     every_limit,
@@ -216,6 +217,9 @@ def choose(
         limits_kept = verdict_of(limits_of(study, confirmed["pick"])) == "kept"
         if limits_kept or len(trials) == study.file.confirmation.tries:
             break
+        if verdict_of(class_limits(study, confirmed["pick"])) != "kept":
+            # No surface has a class: the front stays away from there.
+            study = _without(study, points["pick"].point)
         if searched is None:
             front = find_front(study, [baseline, *(point for point, _, _ in trials)], len(trials))
             if front.violations is not None and not _promises_less(study, front, [point for point, _, _ in trials]):
@@ -234,6 +238,8 @@ def choose(
 def _promises_less(study: Problem, front: ParetoFront, simulated: Sequence[Confirmed]) -> bool:
     """Whether the closest point is expected to miss its worst limit by less, beyond the errors, than every ``simulated`` one."""
     assert front.violations is not None
+    if not study.goals.limited:
+        return False
     bounds = np.array([abs(bound) or 1.0 for _, _, bound in study.goals.limited])
     missed = min(
         max((-limit.room - (limit.error or 0.0)) / (abs(limit.bound) or 1.0) for limit in every_limit(study, point))
@@ -243,7 +249,7 @@ def _promises_less(study: Problem, front: ParetoFront, simulated: Sequence[Confi
 
 
 def _without(study: Problem, point: Array) -> Problem:
-    """The study without the part of its region where a point (k,) failed."""
+    """The study without the part of its region where a point (k,) failed, or its cage missed its limit."""
     remaining = study.remaining or Remaining(study.surfaces[0].data.points, np.empty((0, point.size)))
     failed = np.vstack([remaining.failed, study.coded(point)])
     return replace(study, remaining=replace(remaining, failed=failed))

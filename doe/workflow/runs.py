@@ -14,14 +14,14 @@ from doe.designs import Design
 from doe.designs.design import SAME_POINT
 from doe.designs.model import Evaluation, lattice, lost_terms
 from doe.designs.optimal import Remaining, added_points
-from doe.duty import DutyResult
+from doe.duty import DutyResult, Simulated, cages_of
 from doe.running.runner import Progress
 from doe.running.store import Cause, Failure, alike, grouped, sentence
 from doe.study_file.sections import at_point
 from doe.study_file.table import read_table
 from doe.workflow.design import DesignRun, all_terms, check_runs, design_runs, evaluation, realised, terms_of
 from doe.workflow.problem import Problem, RunPlan
-from rbdyn.base.arrays import Array, Whole
+from rbdyn.base.arrays import Array, Mask, Whole
 from rbdyn.base.faults import RunError
 from rbdyn.base.notes import DANGER, Note, Notes
 from rbdyn.base.records import Record, finite
@@ -40,7 +40,8 @@ class Runs:
     values of each half-width (0: unknown; None: all unknown). ``block`` (n,) labels each run; None: one block.
     ``failures``: failed design runs, which are not in the arrays. ``turns``: shaft turns of all runs. ``at_points``: by
     point of the duty, the same runs with the figures of the simulation there as responses; empty without a duty. ``design``: of
-    simulated runs, with those added in place of failed ones.
+    simulated runs, with those added in place of failed ones. ``cages_missed`` (n,): whether most replicates have a cage of no class that
+    the study allows; None where that is so at no run or at all.
     """
 
     coded: Array
@@ -54,6 +55,7 @@ class Runs:
     turns: float = 0.0
     at_points: Mapping[str, "Runs"] = field(default_factory=dict)
     design: Design | None = None
+    cages_missed: Mask | None = None
 
     @property
     def places(self) -> list[int]:
@@ -97,6 +99,13 @@ def run_design(study: Problem, simulations: clearance.Simulations, progress: Pro
         )
         left_out = f"{counted(len(failures), 'design run')} failed and {are(len(failures))} left out: {sentence(failures).rstrip('.')}."
         notes.insert(0, Note("lost-runs", f"{left_out}{instead} Front and pick stay where the nearest run went well."))
+    missed = _cages_missed(study, sound)
+    if missed is not None:
+        runs_words = f"{counted(int(missed.sum()), 'design run')} of {len(sound)} {are(int(missed.sum()))} outside"
+        sentence_words = (
+            f"{runs_words} limits.cage.verdict. Front and pick stay where the cage of the nearest run keeps it."
+        )
+        notes.insert(0, Note("cage-class", sentence_words))
     values, errors, independent = clearance.figures(study.responses, sound)
     block = np.array(design.block_numbers)[rows] if design.blocks > 1 else None
     runs = Runs(
@@ -110,6 +119,7 @@ def run_design(study: Problem, simulations: clearance.Simulations, progress: Pro
         failures,
         turns=simulations.turns,
         design=design,
+        cages_missed=missed,
     )
     at_points = {}
     for name in study.shares:
@@ -166,12 +176,21 @@ def _with_replacements(
     )
 
 
+def _cages_missed(study: Problem, results: Sequence[Simulated]) -> Mask | None:
+    """By result whether most replicates have no class of the limit, at any point of a duty; None where none or all have none."""
+    classes = study.file.limits.classes
+    missed = np.array([any(found.mostly_other_than(classes) for found in cages_of(each).values()) for each in results])
+    return missed if classes and missed.any() and not missed.all() else None
+
+
 def with_remaining(study: Problem, runs: Runs) -> Problem:
-    """The study with what remains of its region where runs failed."""
-    if not runs.failures:
-        return study
+    """The study with what remains of its region where runs failed, or their cages have no class of the limit."""
+    missed = np.zeros(len(runs.coded), bool) if runs.cages_missed is None else runs.cages_missed
     failed = [[failure.factors[name] for name in study.factors] for failure in runs.failures]
-    return replace(study, remaining=Remaining(runs.coded, study.coded(np.array(failed))))
+    if not failed and not missed.any():
+        return study
+    lost = study.coded(np.array(failed).reshape(-1, len(study.factors)))
+    return replace(study, remaining=Remaining(runs.coded[~missed], np.vstack([lost, runs.coded[missed]])))
 
 
 def _distinct_notes(notes: Sequence[Notes]) -> list[Note]:

@@ -74,6 +74,7 @@ CODES: dict[str, Code] = {
     "tolerances": Code(WARNING, "no tolerances, or too fine ones, keep what the study asks"),
     "region": Code(WARNING, "the region of the study moved to where its clearances in operation stay above their floors"),
     "lost-runs": Code(WARNING, "runs or input sets failed and are left out"),
+    "cage-class": Code(WARNING, "front and pick of a study stay away from runs whose cage misses its limit"),
     "inputs": Code(WARNING, "what is known of unknown inputs is doubtful, or keys of the study override it"),
     "emulator": Code(WARNING, "an emulator explains too little, or a range has too few input sets"),
     "advice": Code(WARNING, "the study can be made better by a setting, which the note names"),

@@ -250,17 +250,7 @@ def slip_map(
     ``notice``: called with a sentence on long runs, as in ``simulate``.
     Raises InputError where a key or a value is impossible or the scene has a schedule, KeyboardInterrupt on Ctrl-C.
     """
-    if scene.operation.schedule is not None:
-        raise InputError(["operation.schedule: a map sets speed and load itself; take the schedule away"])
-    refuse(first_guess_faults(scene.thermal, scene.lubricant, keys))
-    if (count := len(columns) * len(rows)) > MOST_VALUES:
-        raise InputError(
-            [f"{', '.join(keys)}: {count} points are more than the {MOST_VALUES} kept at once; take fewer"]
-        )
-    places = [dict(zip(keys, place, strict=True)) for place in itertools.product(columns, rows)]
-    places.sort(key=lambda place: place[keys[1]])
-    scenes = [scene.overridden([f"{key}={value:.17g}" for key, value in place.items()]) for place in places]
-    at: list[At] = [{key: value for key, value in place.items() if key not in AXES} or None for place in places]
+    scenes, at = _scenes(scene, columns, rows, keys)
     store, version = Checkpoint(kept_in), code_version("rbdyn.dynamics.simulate", __name__)
     digests = [run_key(point.model_dump(mode="json"), version) for point in scenes]
     points = {place: Point.from_dict(record) for place, key in enumerate(digests) if (record := store.get(key))}
@@ -307,6 +297,24 @@ def slip_map(
     ordered = tuple(points[place] for place in range(len(scenes)))
     axes = dict(zip(keys, (tuple(columns), tuple(rows)), strict=True))
     return SlipMap(axes, ordered, wall_s, scene.numerics.seed)
+
+
+def _scenes(
+    scene: Scene, columns: Sequence[float], rows: Sequence[float], keys: tuple[str, str]
+) -> tuple[list[Scene], list[At]]:
+    """The scene of each point, and its keys besides speed and load, columns rising in each row. Raises InputError."""
+    if scene.operation.schedule is not None:
+        raise InputError(["operation.schedule: a map sets speed and load itself; take the schedule away"])
+    refuse(first_guess_faults(scene.thermal, scene.lubricant, keys))
+    if (count := len(columns) * len(rows)) > MOST_VALUES:
+        raise InputError(
+            [f"{', '.join(keys)}: {count} points are more than the {MOST_VALUES} kept at once; take fewer"]
+        )
+    places = [dict(zip(keys, place, strict=True)) for place in itertools.product(columns, rows)]
+    places.sort(key=lambda place: place[keys[1]])
+    scenes = [scene.overridden([f"{key}={value:.17g}" for key, value in place.items()]) for place in places]
+    at: list[At] = [{key: value for key, value in place.items() if key not in AXES} or None for place in places]
+    return scenes, at
 
 
 def _at_temperatures(scene: Scene, workers: int | None, stop: Stop, pace: Pace) -> Scene | str:

@@ -14,6 +14,8 @@ from rbdyn.base.words import counted
 from rbdyn.verdict.orbits import PRIOR_OF_CLASS, PRIOR_OF_OTHERS, CageClass, Forcing, Orbit, Thresholds, orbit_class
 
 MEASURES = [measure.name for measure in fields(Orbit)]
+# Difference of two classes over their joint scatter that shows two regimes; halves of one normal scatter are 1.9 apart.
+TWO_REGIMES = 10.0
 
 
 class Share(NamedTuple):
@@ -107,14 +109,20 @@ class CageVerdict(Record):
 
     def is_one_of(self, names: Collection[str]) -> bool | None:
         """Whether the class is one of these; None where the share of neither these nor the others is large enough, or none is judged."""
-        others = [name for name in self.replicates if name not in names]
         if self.name != self.rule:
             return None
         if self.share_of(names) >= self.least_share:
             return True
-        if "not judged" in others and {"rattling", "wandering"} & {*names}:
-            return None
-        return False if self.share_of(others) >= self.least_share else None
+        return False if self.share_of(self._others(names)) >= self.least_share else None
+
+    def mostly_other_than(self, names: Collection[str]) -> bool:
+        """Whether more than half of the replicates are judged to have none of these classes."""
+        return self.part_of(self._others(names)) > 0.5
+
+    def _others(self, names: Collection[str]) -> list[str]:
+        """Classes of replicates that are none of these; a motion that is not judged may rattle or wander."""
+        doubtful = {"not judged"} if {"rattling", "wandering"} & {*names} else set()
+        return [name for name in self.replicates if name not in {*names, *doubtful}]
 
 
 def _share(count: int, total: int) -> Share:
@@ -138,6 +146,7 @@ def cage_verdict(trials: Sequence[Trial], limits: Thresholds, reason: str | None
     classes = [orbit_class(*trial, limits) for trial in trials]
     shares = class_shares(classes)
     rule = name = verdict(shares, limits)
+    series = {key: np.array([getattr(trial.orbit, key) for trial in trials]) for key in MEASURES}
     needed = limits.fewest_replicates
     if reason is not None:
         name = "not judged"
@@ -145,7 +154,8 @@ def cage_verdict(trials: Sequence[Trial], limits: Thresholds, reason: str | None
         reason = "it neither holds still nor goes round, and verdict.rattling_turnover has no value"
     elif rule == "undecided" and len(trials) < needed:
         reason = f"a class needs {needed} replicates alike"
-    series = {key: np.array([getattr(trial.orbit, key) for trial in trials]) for key in MEASURES}
+    elif rule == "undecided" and any(_apart(classes, values) for values in series.values()):
+        reason = "two regimes last, and the start decides which"
     if all(trial.forcing.turnover is not None for trial in trials):
         series["turnover"] = np.array([trial.forcing.turnover for trial in trials])
     return CageVerdict(
@@ -158,6 +168,14 @@ def cage_verdict(trials: Sequence[Trial], limits: Thresholds, reason: str | None
         least_share=limits.least_share,
         reason=reason,
     )
+
+
+def _apart(classes: Sequence[CageClass], values: Array) -> bool:
+    """Whether a measure of two classes of two replicates at least is so far apart that no single regime scatters over their limit."""
+    (first, most), (second, fewer) = Counter(classes).most_common(2)
+    one, other = (values[[name == place for place in classes]] for name in (first, second))
+    scatter = math.hypot(one.std(), other.std())
+    return min(most, fewer) > 1 and abs(float(one.mean() - other.mean())) > TWO_REGIMES * scatter
 
 
 def _error(values: Array) -> float | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -120,7 +121,7 @@ def test_the_probability_of_a_limit_is_the_share_of_its_classes(tmp_path):
         (
             {"held": 5, "circling": 3},
             1,
-            "the class of the pick's cage is undecided (held in 5, circling in 3 of 8 replicates)",
+            "the class of the pick's cage is undecided (held in 5, circling in 3 of 8 replicates; two regimes last",
         ),
     ],
 )
@@ -190,3 +191,35 @@ def test_input_sets_too_short_for_a_class_are_refused(tmp_path):
     path.write_text(path.read_text(encoding="utf-8") + UNKNOWN.format(turns=20), encoding="utf-8")
     with pytest.raises(InputError, match=r"uncertain\.set: input sets of 7\.\d+ cage turns are shorter than the 10"):
         case_of_study(Problem.load(path))
+
+
+@pytest.mark.parametrize("by", ["design", "pick"])
+def test_front_and_pick_stay_where_cages_keep_the_limit(tmp_path, monkeypatch, by):
+    """The figures are best at small pockets, whose cages are in fast whirl in the design's runs, or in the first pick alone."""
+    instantly(monkeypatch.setattr)
+    unillustrated(monkeypatch.setattr)
+    from rbdyn.dynamics import simulate as module
+
+    usual, path = module.simulate, limited(tmp_path, "held")
+    baseline, picks = Problem.load(path).baseline[-1], []
+
+    def simulate(scene, *rest, **more):
+        count, pocket = scene.numerics.replicates, scene.cage.pocket_clearance_mm
+        if count == 8 and pocket != baseline:
+            picks.append(pocket)
+        whirls = pocket < 0.27 if by == "design" else pocket in picks[:1]
+        verdict = found(fast_whirl=count) if whirls else found(held=count)
+        return replace(usual(scene, *rest, **more), verdict=verdict)
+
+    monkeypatch.setattr(module, "simulate", simulate)
+    done = CliRunner().invoke(app, ["study", str(path), "--json", "--out", str(tmp_path / "out")])
+    record = json.loads(done.stdout)
+    assert done.exit_code == 0 and record["limits"]["cage_held_share"]["verdict"] == "kept"
+    words = [note["text"] for note in record["notes"] if note["code"] == "cage-class"]
+    if by == "design":
+        assert record["pick"]["pocket_clearance_mm"] > 0.27
+        assert re.fullmatch(
+            r"\d design runs of 20 are outside limits\.cage\.verdict\. Front and pick stay .*\.", *words
+        )
+    else:
+        assert record["tried"] == 2 and record["pick"]["pocket_clearance_mm"] != picks[0] and not words

@@ -124,7 +124,13 @@ def test_distances_count_in_standard_errors():
     [
         ([1.0] * 8, None, "Cage: circling (8 of 8 replicates)"),
         ([1.0] * 5, None, "Cage: undecided (circling in 5 of 5 replicates; a class needs 6 replicates alike)"),
-        ([1.0] * 3 + [2.0] * 5, None, "Cage: undecided (fast whirl in 5, circling in 3 of 8 replicates)"),
+        (
+            [1.0] * 3 + [2.0] * 5,
+            None,
+            "Cage: undecided (fast whirl in 5, circling in 3 of 8 replicates; two regimes last, and the start decides which)",
+        ),
+        ([1.0, 1.1, 1.15, 1.25, 1.3, 1.4], None, "Cage: undecided (circling in 3, fast whirl in 3 of 6 replicates)"),
+        ([1.0] * 5 + [2.0], None, "Cage: undecided (circling in 5, fast whirl in 1 of 6 replicates)"),
         (
             [1.0] * 8,
             "films alone drive the rollers",

@@ -76,6 +76,7 @@ def test_friction_of_pockets_turns_a_cage_on_its_rollers_to_fast_whirl(friction,
     rate = (6 * found["measures"]["rate"][0] - circling * (len(classes) > 1)) / (6 - circling * (len(classes) > 1))
     assert rates[0] < rate < rates[1]
     assert found["class"] == ("undecided" if len(classes) > 1 else "circling")
+    assert found.get("reason") == ("two regimes last, and the start decides which" if len(classes) > 1 else None)
 
 
 @pytest.mark.parametrize("friction", [0.02, 0.4])
