@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 from rbdyn.compiled.kernel import kernel, law, routine
 from rbdyn.dynamics.forces.equations import motions
-from rbdyn.dynamics.forces.races import race_observed
+from rbdyn.dynamics.forces.races import RaceWrench, race_observed
 from rbdyn.dynamics.forces.state import (
     ENTRY_ENERGIES,
     ENTRY_ENERGY,
@@ -59,7 +59,7 @@ class RaceSamples(NamedTuple):
 
 @law
 def book_races(samples, bearing, y, time, next_time, followed, sums):
-    """Sample all race contacts in state ``y`` where it is ``time`` [s] for it; returns when the next sample is due [s].
+    """Sample the race contacts in state ``y`` where it is ``time`` [s] for it; returns when the next sample is due [s].
 
     ``followed`` (FOLLOWED, rollers) and ``sums`` (SAMPLED, columns) change in place.
     """
@@ -74,19 +74,30 @@ def _(samples, bearing, y, time, next_time, followed, sums):
 def _(samples, bearing, y, time, next_time, followed, sums):
     if time < next_time:
         return next_time
-    sample_races(samples, bearing, y, followed, sums)
+    sample_races(samples, bearing, y, int(next_time / samples.spacing + 0.5), followed, sums)
     return max(next_time + samples.spacing, time)
 
 
+# Contacts of a roller are booked in one of so many samples, in turn; its entry is followed in all of them.
+ROUNDS = 3
+
+
 @routine
-def sample_races(samples, bearing, y, followed, sums):
-    """``book_races`` at a time of a sample."""
+def sample_races(samples, bearing, y, number, followed, sums):
+    """``book_races`` at the time of the sample of this ``number``."""
     _, _, inner, outer = motions(bearing, y)
-    for j in range(bearing.rollers):
-        contact = race_observed(bearing.outer, 1.0, bearing, y, j, outer)
-        book_contact(samples.outer, contact, OUTER_DENSITIES, OUTER_FLASHES, sums)
-        contact = race_observed(bearing.inner, -1.0, bearing, y, j, inner)
-        book_contact(samples.inner, contact, INNER_DENSITIES, INNER_FLASHES, sums)
+    z, reach2 = bearing.rollers, bearing.inner.reach * bearing.inner.reach
+    for j in range(z):
+        booked = (j + number) % ROUNDS == 0
+        if booked:
+            contact = race_observed(bearing.outer, 1.0, bearing, y, j, outer)
+            book_contact(samples.outer, contact, OUTER_DENSITIES, OUTER_FLASHES, sums)
+        dx, dy = y[j] - inner.x, y[z + j] - inner.y
+        contact = RaceWrench(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+        if dx * dx + dy * dy < reach2:
+            contact = race_observed(bearing.inner, -1.0, bearing, y, j, inner)
+            if booked:
+                book_contact(samples.inner, contact, INNER_DENSITIES, INNER_FLASHES, sums)
         follow_entry(samples, contact, j, followed, sums)
 
 

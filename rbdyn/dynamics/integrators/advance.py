@@ -366,8 +366,9 @@ def advance(bearing, control, carry, tally, t_end, sample_step):
                 refine_peak(bearing, carry, h, tally)
             if clock[TRACED] <= clock[NOW] + h:
                 book_trace(carry, h)
+            # At the end of the step that is nearest: always the next one would be half a step late.
             clock[RACES] = book_races(
-                bearing.samples, bearing, stage, clock[NOW] + h, clock[RACES], followed, tally.races
+                bearing.samples, bearing, stage, clock[NOW] + 1.5 * h, clock[RACES], followed, tally.races
             )
             counts[ACCEPTED] += 1
             clock[NOW] = t_end if cut else clock[NOW] + h
