@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import json
 from functools import cache
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from conftest import ROOT
+from scipy.stats import f_oneway
 from short_studies import short_study
 
 import rbdyn
@@ -20,7 +22,15 @@ from rbdyn.dynamics.figures import DAMAGE, sliding_over_track
 from rbdyn.dynamics.forces.state import CAGE_ANGLE, ENTRY_SLIPS, SAMPLES_NUMBER
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.run import Run
-from rbdyn.dynamics.statistics.extremes import LARGEST_DISTANCE, RETURN_WINDOWS, distance, moments_of, return_level
+from rbdyn.dynamics.statistics.extremes import (
+    LARGEST_DISTANCE,
+    RETURN_WINDOWS,
+    chance_of_one_law,
+    distance,
+    moments_of,
+    return_force_notes,
+    return_level,
+)
 from rbdyn.result import SimulationResult
 from rbdyn.scene import Scene
 
@@ -77,6 +87,31 @@ def test_a_figure_without_its_law_is_left_out(override, missing):
     scene = Scene.load(ROOT / "examples" / "cylindrical_roller.toml", [override])
     (figure,) = (figure for figure in DAMAGE if figure.key == missing)
     assert figure.scale_in(scene) is None
+
+
+def replicates_with(windows):
+    """Replicates with these largest pocket forces (replicates, windows)."""
+    return [
+        SimpleNamespace(windows=lambda force, row=row: row, largest_load=lambda force, row=row: row.max())
+        for row in windows
+    ]
+
+
+def test_a_note_says_why_there_is_no_return_force():
+    """One replicate in another regime, a law with two steps, and too few windows each have their own cause and fix."""
+    random = np.random.default_rng(3)
+    alike = random.gumbel(86.0, 0.3, (8, 5))
+    assert not return_force_notes(replicates_with(alike))
+    apart = alike + np.array([[2.0], *[[0.0]] * 7])
+    stepped = np.tile([80.0, 90.0, 80.0, 90.0], (8, 2))
+    for windows, why in (
+        (apart, "several lasting motions"),
+        (stepped, "Gumbel's law"),
+        (alike[:, :2], "fewer than 30"),
+    ):
+        (note,) = return_force_notes(replicates_with(windows))
+        assert why in note
+    assert chance_of_one_law(replicates_with(apart)) == pytest.approx(f_oneway(*apart).pvalue)
 
 
 def test_return_level_is_the_quantile_of_gumbels_law():
