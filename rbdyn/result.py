@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar
 
 from rbdyn.base.blocks import Column, Sheet, columns_of, within
 from rbdyn.base.files import read_record, write_json
-from rbdyn.base.notes import Notes
+from rbdyn.base.notes import Note, Notes
 from rbdyn.base.records import Record, derived, nullable, shown, spread, written
 from rbdyn.base.words import Brief, Figure, counted, error_alone, quantity, value_alone
 from rbdyn.verdict.replicates import CageVerdict
@@ -132,7 +132,7 @@ def start_sheet(start: "StartResult | None" = None) -> Sheet[Mapping[str, float]
         Column[Mapping[str, float]]("low_{figure}, high_{figure}", meaning="5 and 95 % over the inputs of the balance"),
     ]
     rows = [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
-    content = "One row per moment of a start ([thermal.start]), of `rbdyn simulate`."
+    content = "One row per moment of a start ([thermal.start]), of `rbdyn simulate` and `rbdyn ball`."
     return Sheet("", listed, rows, file="start.csv", content=content)
 
 
@@ -189,10 +189,21 @@ START_FIGURES = {
 }
 
 
+# Those of a ball bearing alone.
+BALL_START_FIGURES = {"start_axial_load_N": "axial_load_N", "start_contact_pressure_MPa": "contact_pressure_MPa"}
+
+
 class LeastClearance(Record):
     """Least diametral clearance of a start [um], and when; ``time_s``: None where it falls to its steady value without a minimum."""
 
     least: Quantity
+    time_s: float | None
+
+
+class GreatestValue(Record):
+    """Largest value of a start, and when; ``time_s``: None where it is at an end of the course."""
+
+    greatest: Quantity
     time_s: float | None
 
 
@@ -210,6 +221,7 @@ class StartResult(Record, kw_only=True):
     """Start of a cold machine: least clearances, the lead of the inner ring, and temperatures over time.
 
     - ``status``: "steady", or with its ``reason`` "seizure", "too hot", "no steady state" or "undecided"
+    - ``axial_load_N`` and ``contact_pressure_MPa``: largest ones of a ball bearing, which has no cage here, and no ``moments``
     - ``temperature_difference_K``: largest lead of the inner ring over the outer one; ``time_to_steady_s``: from which on all
       temperatures stay within 1 K of the last ones, None without a steady state
     - ``race_pressure_MPa``: largest pressure where the radial clearance is least, None where some is left
@@ -220,8 +232,10 @@ class StartResult(Record, kw_only=True):
     status: str
     reason: str | None = None
     radial_um: LeastClearance
-    guide_um: LeastClearance | None
-    pocket_um: LeastClearance
+    guide_um: LeastClearance | None = None
+    pocket_um: LeastClearance | None = None
+    axial_load_N: GreatestValue | None = None  # noqa: N815
+    contact_pressure_MPa: GreatestValue | None = None  # noqa: N815
     temperature_difference_K: Quantity  # noqa: N815
     time_to_steady_s: float | None
     race_pressure_MPa: float | None  # noqa: N815
@@ -234,10 +248,24 @@ class StartResult(Record, kw_only=True):
     path: dict[str, Any]
 
     @property
+    def lost_clearance(self) -> Notes:
+        """A note where the radial clearance is lost on the way, or can be over the inputs."""
+        play, low = getattr(self, START_FIGURES["start_radial_clearance_um"]), self.ranges.get("radial_um", (0.0,))[0]
+        if play.least.value < 0.0:
+            when = "" if play.time_s is None else f" after {play.time_s:.3g} s"
+            return (Note("clearance", f"start: the radial clearance falls to {play.least.value:.0f} µm{when}"),)
+        sentence = f"start: over its inputs the radial clearance can fall to {low:.0f} µm; widen it or warm up slowly"
+        return (Note("clearance", sentence),) if low < 0.0 else ()
+
+    @property
     def figures(self) -> dict[str, Quantity]:
-        """Figures that a study may name, by ``START_FIGURES``."""
-        parts = {key: getattr(self, name) for key, name in START_FIGURES.items()}
-        return {key: getattr(part, "least", part) for key, part in parts.items() if part is not None}
+        """Figures that a study or a sweep may name, by ``START_FIGURES`` and ``BALL_START_FIGURES``."""
+        parts = {key: getattr(self, name) for key, name in (START_FIGURES | BALL_START_FIGURES).items()}
+        return {
+            key: getattr(part, "least", getattr(part, "greatest", part))
+            for key, part in parts.items()
+            if part is not None
+        }
 
 
 class FigureOf:

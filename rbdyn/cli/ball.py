@@ -16,12 +16,13 @@ if TYPE_CHECKING:
 
 
 # Names of the files of an equilibrium, of a sweep, of the other studies and of all pictures.
-EQUILIBRIUM_FILES, SWEEP_FILES = ("result.json", "balls.csv", "runout.csv"), ("sweep.json", "sweep.csv")
+EQUILIBRIUM_FILES, SWEEP_FILES = ("result.json", "balls.csv", "runout.csv", "start.csv"), ("sweep.json", "sweep.csv")
 STUDY_FILES = tuple(
     f"{name}.{kind}" for name in ("preload", "clearance", "wear", "race_limits") for kind in ("json", "csv")
 )
 PICTURES = (
     "loads.png", "angles.png", "section.png", "pressure_and_life.png", "stiffness.png", "azimuth.png", "map.png",
+    "start.png",
 )  # fmt: skip
 FILES = (*EQUILIBRIUM_FILES, *SWEEP_FILES, *STUDY_FILES, *PICTURES, *REPORT_FILES)
 

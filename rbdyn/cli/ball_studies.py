@@ -31,6 +31,7 @@ from rbdyn.quasistatic.result import (
 from rbdyn.quasistatic.runout.lots import Lot, bench_of, design, follow_ring, single_row
 from rbdyn.quasistatic.runout.turn import RingPath, ToleranceClass, running_accuracy
 from rbdyn.quasistatic.sweep import PointRecord, SweepResult, keys_of_texts, result_of, sweep
+from rbdyn.result import start_sheet
 from rbdyn.scene import BallScene
 from rbdyn.scene.ball import SingleRowScene
 
@@ -302,7 +303,8 @@ def equilibrium_blocks(result: BallResult) -> list[Block]:
     temperatures of the search for steady ones."""
     if not result.is_equilibrium:
         thermal = result.thermal or {}
-        return with_notes(status_notes(result.status), [_search_table(thermal)] if "path_heat_W" in thermal else [])
+        search = [_search_table(thermal)] if "path_heat_W" in thermal else []
+        return with_notes(status_notes(result.status), [*_start_blocks(result), *search])
     titles = {name: f"{name} row" if name else "" for name in result.row_reports}
     rows: list[Block] = []
     for name, row in result.row_reports.items():
@@ -326,8 +328,17 @@ def equilibrium_blocks(result: BallResult) -> list[Block]:
     from rbdyn.compiled.kernel import compiler_notes
 
     whole = Heading("whole bearing" if sentences and any(titles.values()) else "")
-    answer = [*rows, whole, *map(Paragraph, sentences), *tables]
+    answer = [*rows, whole, *map(Paragraph, sentences), *_start_blocks(result), *tables]
     return with_notes((*(result.notes or ()), *compiler_notes()), answer)
+
+
+def _start_blocks(result: BallResult) -> list[Block]:
+    """The start of the cold machine, if the scene has one."""
+    if result.start is None:
+        return []
+    from rbdyn.cli.simulation_output import start_blocks
+
+    return start_blocks(result.start)
 
 
 def with_runout(scene: BallScene, result: BallResult) -> "tuple[BallResult, pd.DataFrame | None]":
@@ -341,11 +352,18 @@ def with_runout(scene: BallScene, result: BallResult) -> "tuple[BallResult, pd.D
 def write_equilibrium(result: BallResult, path: "pd.DataFrame | None", folder: Path) -> list[str]:
     """Write result.json, balls.csv, pictures and the ``path`` of a turning ring; returns the names of the files."""
     result.save(folder / "result.json")
+    files = ["result.json"]
+    if result.start is not None:
+        from rbdyn.plots.start import start
+
+        start_sheet(result.start).save(folder)
+        start(result.start, folder / "start.png")
+        files += ["start.csv", "start.png"]
     if not result.is_equilibrium:
-        return ["result.json"]
+        return files
     from rbdyn.plots.ball import pictures
 
-    files = ["result.json", ball_sheet(result.row_reports).save(folder, "%.8g"), *pictures(result, folder)]
+    files += [ball_sheet(result.row_reports).save(folder, "%.8g"), *pictures(result, folder)]
     if path is not None:
         save_table(path, folder / "runout.csv", "%.8g")
         files.append("runout.csv")

@@ -16,14 +16,22 @@ from rbdyn.clearances import DIFFERENCE, REPORTED, other_ranges
 from rbdyn.dynamics.figures import BEARING, DAMAGE, of_kind, repeated
 from rbdyn.life.duty import PointLife, life_notes, life_sheet
 from rbdyn.properties.rexs import Attributes, write_rexs
-from rbdyn.result import LeastClearance, SimulationResult, StartResult, cage_column, figure_sheet, start_sheet
+from rbdyn.result import (
+    GreatestValue,
+    LeastClearance,
+    Quantity,
+    SimulationResult,
+    StartResult,
+    cage_column,
+    figure_sheet,
+    start_sheet,
+)
 from rbdyn.scene import Scene
 from rbdyn.scene.duty import AXES, DutyPoint, duty_scenes, read_duty, shares_of_time
 from rbdyn.scene.notes import catalogue_entry
 
 if TYPE_CHECKING:
     from rbdyn.dynamics.duty_simulation import DutySimulation, SimulatedPoint, Worst
-    from rbdyn.result import Quantity
 
 
 # Length of the history that --out draws.
@@ -53,7 +61,7 @@ def blocks(result: SimulationResult, folder: Path | None = None) -> list[Block]:
         *([] if result.target is None else [Paragraph(_target_sentence(result.target))]),
         Paragraph(_run_sentence(result)),
         *_temperatures(result),
-        *_start(result),
+        *start_blocks(result.start),
         *(Paragraph(_race_sentence(race, contact)) for race, contact in result.races.items()),
         *_clearances(result),
         Paragraph(_life_sentence(result)),
@@ -222,40 +230,46 @@ def _temperatures(result: SimulationResult) -> list[Block]:
     ]
 
 
-def _start(result: SimulationResult) -> list[Block]:
+def start_blocks(start: StartResult | None) -> list[Block]:
     """Least clearances of a start with what the inputs leave open first, and how it goes; nothing without a start."""
-    start = result.start
     if start is None:
         return []
-    ranges, rows = start.ranges, []
+    rows = list[tuple[str, ...]]()
     for clearance in REPORTED:
         name = f"{clearance.name}_um"
         play: LeastClearance | None = getattr(start, name)
-        if play is None:
-            continue
-        least, spread = play.least, ranges[name]
-        rows.append(
-            (
-                clearance.words,
-                value_alone(least.value, 0.5 * (spread[-1] - spread[0]) or least.stated_error),
-                range_ends(spread),
-                _error(least.stated_error),
-                _when(start, name, play),
-            )
-        )
+        if play is not None:
+            rows.append(_start_row(start, clearance.words, name, play.least, play.time_s))
+    for words, name in (
+        ("largest axial load [N]", "axial_load_N"),
+        ("largest contact pressure [MPa]", "contact_pressure_MPa"),
+    ):
+        found: GreatestValue | None = getattr(start, name)
+        if found is not None:
+            rows.append(_start_row(start, words, name, found.greatest, found.time_s))
     header = ("start: least clearance [µm]", "value", "inputs (90 %)", "error (95 %)", "after [s] (inputs)")
-    simulations = counted(len(start.moments) - 1, "short simulation")
-    inputs = f"start: heat by {simulations} and the steady state; inputs that vary: {', '.join(start.inputs)}"
+    heat = "SKF's friction model at each moment"
+    if start.moments:
+        heat = f"{counted(len(start.moments) - 1, 'short simulation')} and the steady state"
+    inputs = f"start: heat by {heat}; inputs that vary: {', '.join(start.inputs)}"
     return [Table("", header, rows), Paragraph(_start_sentence(start)), Paragraph(inputs, detail=Detail.ALL)]
 
 
-def _when(start: StartResult, name: str, play: LeastClearance) -> str:
-    """When a clearance is least; times over the inputs only where nearly all of these have a minimum."""
-    if play.time_s is None:
-        first, last = (start.path["figures"][name][place] for place in (0, -1))
+def _start_row(start: StartResult, words: str, name: str, extreme: Quantity, time: float | None) -> tuple[str, ...]:
+    """A figure of a start with its range and error, and when."""
+    spread = start.ranges[name]
+    digits = 0.5 * (spread[-1] - spread[0]) or extreme.stated_error
+    value = value_alone(extreme.value, digits)
+    return words, value, range_ends(spread), _error(extreme.stated_error), _when(start, name, extreme, time)
+
+
+def _when(start: StartResult, name: str, extreme: Quantity, time: float | None) -> str:
+    """When a figure is extreme; times over the inputs only where nearly all of these have an extreme inside."""
+    if time is None:
+        first, last = (abs(start.path["figures"][name][place] - extreme.value) for place in (0, -1))
         return "at the start" if first <= last else "at the end"
     times = start.ranges.get(f"{name}_time_s")
-    return f"{shown(play.time_s, 3)} ({range_ends(times) if times else 'not always a minimum'})"
+    return f"{shown(time, 3)} ({range_ends(times) if times else 'not always a minimum'})"
 
 
 def _start_sentence(start: StartResult) -> str:

@@ -53,7 +53,7 @@ class PointStart(Record):
     status: str
     radial_um: LeastClearance
     guide_um: LeastClearance | None
-    pocket_um: LeastClearance
+    pocket_um: LeastClearance | None
     temperature_difference_K: Quantity  # noqa: N815
     time_to_steady_s: float | None
 

@@ -331,7 +331,7 @@ def _result(
         moments=tuple(_record(each) for each in simulated),
         path=_columns(machine, law, path, simulated, ranges.bands),
     )
-    return start, _notes(machine, start, values["radial_um"], distance)
+    return start, _notes(machine, start, distance)
 
 
 def _verdict(machine: Machine, law: Law, path: Path) -> tuple[str, str]:
@@ -478,18 +478,9 @@ def _failure_notes(failures: Sequence[Failure]) -> Notes:
     return (Note("lost-runs", sentence),)
 
 
-def _notes(machine: Machine, start: StartResult, radial: tuple[float, float, bool], distance: float) -> Notes:
-    """Notes of a start with its least ``radial`` clearance [um], its time [s], and whether it is a minimum."""
+def _notes(machine: Machine, start: StartResult, distance: float) -> Notes:
     notes = list(status_notes(f"{start.status}: start: {start.reason}" if start.reason else start.status))
-    (least, time, inside), range_ = radial, start.ranges["radial_um"]
-    if machine.scene.bearing.radial_clearance > 0.0 and least < 0.0:
-        when = f" after {time:.3g} s" if inside else ""
-        notes.append(Note("clearance", f"start: the radial clearance falls to {least:.0f} µm{when}"))
-    elif machine.scene.bearing.radial_clearance > 0.0 and range_[0] < 0.0:
-        sentence = (
-            f"start: over its inputs the radial clearance can fall to {range_[0]:.0f} µm; widen it or warm up slowly"
-        )
-        notes.append(Note("clearance", sentence))
+    notes += start.lost_clearance if machine.scene.bearing.radial_clearance > 0.0 else ()
     if start.status == "steady" and start.share_of_seizure > 0.0:
         share = f"{100.0 * start.share_of_seizure:.0f} % of the input sets ({', '.join(start.inputs)})"
         notes.append(Note("undecided", f"start: a part seizes in {share}"))

@@ -78,7 +78,12 @@ def equilibrium(
     if scene.thermal is not None:
         from rbdyn.quasistatic.temperatures import with_temperatures
 
-        return with_temperatures(scene, single, ranges)
+        result, search = with_temperatures(scene, single, ranges)
+        if search is None or scene.thermal.start is None:
+            return result
+        from rbdyn.quasistatic.start import with_start
+
+        return with_start(scene, search, result, ranges)
     return single(scene)
 
 

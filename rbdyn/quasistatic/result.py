@@ -26,7 +26,7 @@ from rbdyn.properties.materials import equivalent_modulus
 from rbdyn.quasistatic.row.ball import FixedShare, FrictionShare
 from rbdyn.quasistatic.row.equilibrium import INNER_ANGLE, INNER_LOAD, MOMENT, OUTER_ANGLE, OUTER_LOAD, PULL, Solution
 from rbdyn.quasistatic.row.model import RowModel
-from rbdyn.result import SavedRecord
+from rbdyn.result import SavedRecord, StartResult
 from rbdyn.scene.ball import BallRow, BallScene
 from rbdyn.scene.fits import race_film_temperature
 
@@ -264,7 +264,7 @@ class BallResult(Brief, SavedRecord, kw_only=True):
     without one. ``ring_growth_um``, ``fits``: where the scene has ring growth or a mounting. ``other_roots``: other
     equilibria of the same load, where the solver searches for them. ``runout``: of the turning ring, where the command
     computed it. ``temperatures_C``: of "oil", "outer" ring, "inner" ring and balls ("rollers"), where the scene has a heat balance.
-    ``thermal``: the balance: its "status" ("steady", "undecided", "no steady state", "seizure" or "too hot") and the "reason" of any but the
+    ``start``: of the cold machine, with [thermal.start]. ``thermal``: the balance: its "status" ("steady", "undecided", "no steady state", "seizure" or "too hot") and the "reason" of any but the
     first, the "gain" of the loop, heat by node, friction and its loads, heat by way out, conductances, ranges of the temperatures
     over the documented inputs, and the "path_C" of the search. The figures of the report are also attributes, by the keys of the JSON form: ``displacement_mm``, ``life``,
     ``max_stress_MPa``, and ``inner`` and ``outer`` of a double-decker bearing. ``rows``: solutions in SI, one, or those of the inner and outer row of a double-decker bearing; empty for a
@@ -287,6 +287,7 @@ class BallResult(Brief, SavedRecord, kw_only=True):
     runout: dict[str, float] | None = None
     temperatures_C: dict[str, float] | None = None  # noqa: N815
     thermal: dict[str, Any] | None = None
+    start: StartResult | None = None
     rows: tuple[Solution, ...] = outside_json(default=())
     ratings: tuple[Rating, ...] = outside_json(default=())
 
@@ -354,6 +355,7 @@ class BallResult(Brief, SavedRecord, kw_only=True):
         if "clearance_um" in heat:
             figures["operating_clearance_um"] = heat["clearance_um"]["operating"]
             figures["friction_W"] = math.fsum(heat["friction_W"].values())
+        figures |= {} if self.start is None else {name: each.value for name, each in self.start.figures.items()}
         return {name: float(value) for name, value in figures.items() if value is not None}
 
     def brief(self) -> tuple[str, list[Figure]]:

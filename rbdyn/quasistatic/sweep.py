@@ -65,6 +65,8 @@ MEANINGS = {
     "L10_Mrev L10_h": "life",
     "oil_temperature_C outer_temperature_C inner_temperature_C rollers_temperature_C": "with `[thermal]`: of oil, rings and balls",
     "thermal_gain friction_W": "with `[thermal]`: gain of its loop, and the friction that heats the bearing",
+    "start_radial_clearance_um start_inner_minus_outer_K": "with `[thermal.start]`: least clearance, largest lead of the inner ring",
+    "start_axial_load_N start_contact_pressure_MPa": "with `[thermal.start]`: largest axial load and contact pressure",
     "middle_ring_speed_rpm": "of a double-decker: speed of the middle ring",
     "residual_N": "what the equations leave over",
     "iterations": "steps of the solver",
@@ -362,6 +364,7 @@ def _solve(scene: BallScene, before: tuple[Solution, ...]) -> PointRecord:
     if result.temperatures_C is not None and result.thermal is not None:
         figures |= {f"{node}_temperature_C": value for node, value in result.temperatures_C.items()}
         figures |= {"thermal_gain": result.thermal["gain"], "friction_W": sum(result.thermal["friction_W"].values())}
+    figures |= {} if result.start is None else {name: each.value for name, each in result.start.figures.items()}
     figures |= {"residual_N": report.residual_N, "iterations": report.iterations}
     balls = {name: solution.figures for name, solution in zip(rows, result.rows, strict=True)}
     exact = {name: float(value) for name, value in figures.items()}

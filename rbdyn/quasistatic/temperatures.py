@@ -66,8 +66,10 @@ MINERAL = ("mineral", "naphthenic")
 ROLLING_POWER = 0.6
 
 
-def at_temperatures(scene: SingleRowScene, temperatures: Temperatures) -> SingleRowScene:
-    """The scene with stated temperatures in place of its heat balance.
+def at_temperatures(
+    scene: SingleRowScene, temperatures: Temperatures, seats: tuple[float, float] | None = None
+) -> SingleRowScene:
+    """The scene with stated temperatures in place of its heat balance; ``seats`` as of ``part_temperatures``.
 
     It is a copy without validation: temperatures are numbers of the balance, and an impossible bearing shows in its equilibrium.
     """
@@ -76,7 +78,7 @@ def at_temperatures(scene: SingleRowScene, temperatures: Temperatures) -> Single
     oil: dict[str, Any] = {"temperature_C": temperatures.oil, "film_temperature": "parts"}
     if lubricant.viscosity_mPas is not None:
         oil["viscosity_mPas"] = 1e3 * lubricant.at(temperatures.oil).viscosity
-    parts = part_temperatures(thermal, temperatures, cage=False)
+    parts = part_temperatures(thermal, temperatures, cage=False, seats=seats)
     tables = {
         "thermal": None,
         "lubricant": lubricant.model_copy(update=oil),
@@ -232,14 +234,14 @@ def conductances_of(scene: SingleRowScene, thermal: Thermal, model: RowModel, so
     )
 
 
-def heat_at(scene: SingleRowScene, nodes: Array) -> Heat:
-    """The row of a scene with [thermal] at temperatures of its nodes (4,) [C].
+def heat_at(scene: SingleRowScene, nodes: Array, seats: tuple[float, float] | None = None) -> Heat:
+    """The row of a scene with [thermal] at temperatures of its nodes (4,) [C]; ``seats`` as of ``part_temperatures``.
 
     Raises InputError where it has no equilibrium or is overloaded there.
     """
     thermal = scene.thermal
     assert thermal is not None and scene.lubricant is not None
-    hot = at_temperatures(scene, Temperatures(*nodes.tolist()))
+    hot = at_temperatures(scene, Temperatures(*nodes.tolist()), seats)
     model = row_of(hot)
     solution = solve(model.row, model.control, load_of(hot), constraint_of(hot))
     status = solution.status
@@ -335,15 +337,16 @@ def _model(scene: SingleRowScene, states: Sequence[State]) -> HeatModel:
 
 def with_temperatures(
     scene: SingleRowScene, solve: Callable[[SingleRowScene], BallResult], ranged: bool = True
-) -> BallResult:
-    """The result of a scene with [thermal], at its steady temperatures; without such, its temperatures and the path alone.
+) -> tuple[BallResult, Search | None]:
+    """The result of a scene with [thermal], at its steady temperatures, and the search for them; without such, its temperatures and
+    the path alone, and no search where the cold bearing is impossible.
 
     ``solve`` gives the result of a scene at stated temperatures. ``ranged``: with ranges over the inputs of the balance.
     """
     try:
         search = steady_temperatures(scene)
     except InputError as error:
-        return _seized_cold(scene, str(error.faults[0]), solve)
+        return _seized_cold(scene, str(error.faults[0]), solve), None
     last, slopes = search.last, search.slopes
     found: Heat = last.run
     nodes = dict(zip(NODES, last.temperatures.tolist(), strict=True))
@@ -353,7 +356,7 @@ def with_temperatures(
     hot = solve(at_temperatures(scene, Temperatures(**nodes)))
     ranges = ranges_of(scene, last, slopes) if ranged and search.status == "steady" else None
     steady = status == "steady"
-    return replace(
+    result = replace(
         hot,
         status=hot.status if steady else f"{status}: {reason}",
         report=hot.report if steady else None,
@@ -363,6 +366,7 @@ def with_temperatures(
         rows=hot.rows if steady else (),
         scene=scene.model_dump(mode="json"),
     )
+    return result, search
 
 
 def _seized_cold(scene: SingleRowScene, reason: str, solve: Callable[[SingleRowScene], BallResult]) -> BallResult:
@@ -441,9 +445,9 @@ def _geometry(scene: SingleRowScene, found: Heat) -> dict[str, Any]:
 def _notes(scene: SingleRowScene, found: Heat, ranges: Ranges | None) -> Notes:
     """What the heat balance leaves open."""
     kind, (inner, outer), mounting = scene.bearing.kind, scene.operation.speeds, scene.mounting
-    thermal, lubricant, hot = scene.thermal, scene.lubricant, found.scene.lubricant
+    thermal, lubricant = scene.thermal, scene.lubricant
     assert mounting is not None and mounting.width is not None
-    assert thermal is not None and lubricant is not None and hot is not None
+    assert thermal is not None and lubricant is not None
     level = (
         f"temperatures: their heat is SKF's friction model, {LEVELS[kind]} times the heat of ISO 15312 at reference speed, which no "
         "range includes"
@@ -457,14 +461,22 @@ def _notes(scene: SingleRowScene, found: Heat, ranges: Ranges | None) -> Notes:
             + ("; at 1.4 million it was 2.9 times the loss in NASA TP-2275" if kind == "angular_contact_ball" else "")
         )
         notes.append(Note("unverified", sentence))
-    oil = hot.in_service
-    sizes = mounting.bore, mounting.outside_diameter, inner - outer, oil.viscosity / oil.density
-    rest = starvation_factor(GEOMETRIES[kind], *sizes, lubricant.supply)
-    if rest < STARVED:
-        sentence = (
-            f"temperatures: SKF's starvation factor of {rest:.2g} removes the rolling friction of so thick an oil; the heat is "
-            "too low; take a thinner oil or warm it"
-        )
-        notes.append(Note("starved", sentence))
+    notes += starvation_note(found.scene, "temperatures")
     notes += [] if ranges is None else ranges.notes
     return (*notes, *heat_notes(thermal, lubricant, mounting, mounting.width))
+
+
+def starvation_note(hot: SingleRowScene, subject: str) -> Notes:
+    """A note where SKF's starvation factor leaves hardly any rolling friction of a scene at stated temperatures."""
+    lubricant, mounting, (inner, outer) = hot.lubricant, hot.mounting, hot.operation.speeds
+    assert lubricant is not None and mounting is not None
+    oil = lubricant.in_service
+    sizes = mounting.bore, mounting.outside_diameter, inner - outer, oil.viscosity / oil.density
+    rest = starvation_factor(GEOMETRIES[hot.bearing.kind], *sizes, lubricant.supply)
+    if rest >= STARVED:
+        return ()
+    sentence = (
+        f"{subject}: SKF's starvation factor of {rest:.2g} removes the rolling friction of so thick an oil; the heat is "
+        "too low; take a thinner oil or warm it"
+    )
+    return (Note("starved", sentence),)

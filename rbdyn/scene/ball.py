@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self, cast
 
 from pydantic import Field, model_validator
 
-from rbdyn.base.faults import SI, Consistent, NonNegative, NotVanishing, OptionalSI, Positive, Strict
+from rbdyn.base.faults import RPM, SI, Consistent, NonNegative, NotVanishing, OptionalSI, Positive, Strict
 from rbdyn.base.words import counted
 from rbdyn.properties.materials import Material
 from rbdyn.scene.bearing import CustomMaterial, Harmonic, MaterialName, material_of
@@ -14,7 +14,8 @@ from rbdyn.scene.lubricant import Lubricant
 from rbdyn.scene.operation import BallOperation, Mounting, Speed
 from rbdyn.scene.operation import misfits as mounting_faults
 from rbdyn.scene.reading import SceneFile
-from rbdyn.scene.thermal import NO_MOUNTING, Thermal, thermal_faults, with_first_guess
+from rbdyn.scene.start import start_faults
+from rbdyn.scene.thermal import NO_MOUNTING, Thermal, oil_ceiling, thermal_faults, with_first_guess
 
 if TYPE_CHECKING:
     from rbdyn.base.arrays import Array
@@ -584,7 +585,13 @@ def _thermal_faults(scene: BallScene) -> Iterator[str]:
     ):
         if value != usual:
             yield f"thermal.{key} = {value:g}: the model of ball bearings has no cage; leave it out"
-    if thermal.start is not None:
-        yield "[thermal.start]: is for roller bearings; a ball bearing has its steady state only, so leave it out"
+    start, oil, mounting = thermal.start, scene.lubricant, scene.mounting
+    if start is not None and oil is not None and mounting is not None:
+        from rbdyn.life.balls import FASTEST
+
+        fastest = 2.0 * FASTEST[scene.bearing.kind] / (mounting.bore + mounting.outside_diameter) / RPM
+        yield from start_faults(start, oil, thermal.ambient_C, oil_ceiling(thermal, oil), round(fastest, -2))
+        if start.schedule and start.schedule.load_N and scene.operation.displacements[0] is not None:
+            yield "thermal.start.schedule.load_N: has no effect, since operation.prescribed.x_mm holds the ring; leave one out"
     if scene.errors is not None:
         yield "[thermal] and [errors]: runout is computed at stated temperatures; leave out one of them"

@@ -60,7 +60,8 @@ class Start(Strict):
     """Warming of a cold machine: temperatures and clearances over time until they are steady. Rings warm before the housing, so
     clearances are often least after one to five minutes.
 
-    The heat follows a few short simulations, at most ten, from which it is interpolated over temperature, speed and load.
+    The heat of rollers follows a few short simulations, at most ten, from which it is interpolated over temperature, speed and load;
+    that of balls is SKF's friction at every moment.
     """
 
     from_C: OilCelsius | None = None  # noqa: N815

@@ -282,14 +282,6 @@ def test_unit_bad_starts_are_refused(start, message):
     assert len(refusal.value.faults) == 1
 
 
-def test_unit_no_start_of_balls():
-    """Unit: a ball bearing refuses the table by a sentence."""
-    tables = _tables("6208", "--speed", "6000", "--load", "1000", "--oil", "ISO VG 68", "--ambient", "20", start={})
-    del tables["numerics"]
-    with pytest.raises(InputError, match=r"\[thermal.start\]: is for roller bearings"):
-        Scene.from_dict(tables)
-
-
 def test_unit_nothing_without_a_start(cold):
     """Unit: without the table the figures have the same bits and the modules of a start are not loaded."""
     plain = simulate(_scene(), workers=2, notice=None)
