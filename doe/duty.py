@@ -357,11 +357,13 @@ class DutyResult:
 
 
 Simulated = SimulationResult | DutyResult
+# Key of a verdict without a duty.
+OPERATION = "operation"
 
 
 def cages_of(result: Simulated) -> dict[str, CageVerdict]:
-    """Verdict on the cage by point of the duty, or under "operation"; empty where its scene leaves it out."""
-    results = result.points if isinstance(result, DutyResult) else {"operation": result}
+    """Verdict on the cage by point of the duty, or under OPERATION; empty where its scene leaves it out."""
+    results = result.points if isinstance(result, DutyResult) else {OPERATION: result}
     return {name: run.verdict for name, run in results.items() if run.verdict is not None}
 
 

@@ -96,8 +96,7 @@ def write(outcome: StudyResult, folder: Path) -> dict[str, Any]:
             save(drawn_stills, folder / name)
             pictures.append(name)
     motions = clearance.histories(outcome.scenes, DRAWN_TURNS)
-    cages = {name: outcome.confirmed[name].cages.get(outcome.main_point) for name in motions}
-    pictures += clearance.draw_motion(motions, folder, {name: cage.name for name, cage in cages.items() if cage})
+    pictures += clearance.draw_motion(motions, folder, outcome.cage_classes)
     drawn = {name: clearance.drawn_motion(motion) for name, motion in motions.items()}
     texts = {"report.html": html_report(result, drawn), "answer.txt": answer_text(result)}
     for name, text in texts.items():

@@ -18,7 +18,7 @@ from doe.designs import Design
 from doe.dimension_chain import Chain, ChainResult, chain_from, solve
 from doe.dimension_chain.allocation import Allocation
 from doe.dimension_chain.refusal import allocated_reason
-from doe.duty import Duty, DutyResult, scene_at
+from doe.duty import OPERATION, Duty, DutyResult, scene_at
 from doe.pareto import ParetoFront
 from doe.running.queue import Part, rows_of
 from doe.running.runner import ANSWER, AgendaKeeper, Stage
@@ -264,6 +264,12 @@ class StudyResult:
         """The point of the duty that ``scenes`` are at."""
         duty = Duty.of(self.study)
         return EVERYWHERE if duty is None else duty.main
+
+    @property
+    def cage_classes(self) -> dict[str, str]:
+        """Class of the cage in these scenes; without one where they leave it out."""
+        cages = {name: self.confirmed[name].cages.get(self.main_point or OPERATION) for name in ("baseline", "pick")}
+        return {name: cage.name for name, cage in cages.items() if cage is not None}
 
     @cached_property
     def clearances(self) -> OperatingClearances:

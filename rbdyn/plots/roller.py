@@ -53,11 +53,11 @@ SMALLEST_SHARE = 1e-4
 
 
 def _guide_circle(axis: Axes, history: "History") -> None:
-    clearance = history.scene.guide_clearance_m
-    if clearance is not None:
-        angle = np.linspace(0.0, 2.0 * np.pi, 361)
-        x, y = clearance * 1e6 * np.cos(angle), clearance * 1e6 * np.sin(angle)
-        axis.plot(x, y, "--", color=GREY, linewidth=0.9, label="half of the diametral guide clearance")
+    clearance = history.scene.orbit_play_m
+    of = "pocket" if history.scene.guide_clearance_m is None else "diametral guide"
+    angle = np.linspace(0.0, 2.0 * np.pi, 361)
+    x, y = clearance * 1e6 * np.cos(angle), clearance * 1e6 * np.sin(angle)
+    axis.plot(x, y, "--", color=GREY, linewidth=0.9, label=f"half of the {of} clearance")
 
 
 def _plane(axis: Axes) -> None:

@@ -42,7 +42,8 @@ def finished(tmp_path_factory):
 
 
 def test_every_file_is_written(finished):
-    _, folder, files = finished
+    outcome, folder, files = finished
+    assert outcome.cage_classes == dict.fromkeys(("baseline", "pick"), "not judged")
     assert {"summary.json", "design_runs.csv", "anova.csv", "front.csv", "part_dimensions.csv"} <= set(files)
     assert {"report.html"} <= set(files)
     assert {"pareto_front.png", "cage_orbit.png", "pocket_forces.png"} <= set(files)
