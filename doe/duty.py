@@ -8,7 +8,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -17,12 +17,13 @@ from doe.study_file import Study
 from doe.study_file.sections import Aggregate, at_point
 from doe.study_file.study import PointResponse
 from rbdyn.base.arrays import Array, Whole
-from rbdyn.base.faults import RunError, key_path
+from rbdyn.base.faults import InputError, RunError, key_path
 from rbdyn.base.notes import Notes, merged
 from rbdyn.base.records import finite
 from rbdyn.dynamics.figures import FIGURES
 from rbdyn.result import Quantity, SimulationResult, arrays_of
 from rbdyn.scene import Scene
+from rbdyn.scene.duty import AMBIENT, starting
 from rbdyn.verdict.replicates import CageVerdict
 
 if TYPE_CHECKING:
@@ -75,7 +76,7 @@ class Rule(NamedTuple):
 class Duty:
     """Shares of the time and overrides by point, in the order of the names; rules of the responses by name of their figure.
 
-    ``limits``: point and figure of each response that is a limit at a point. ``groups``: names of points, those with one scene
+    ``origins``: from which state points begin, by name, of those that state it. ``limits``: point and figure of each response that is a limit at a point. ``groups``: names of points, those with one scene
     together; empty where nobody has compared the scenes.
     """
 
@@ -84,6 +85,7 @@ class Duty:
     rules: Mapping[str, Rule]
     limits: tuple[tuple[str, str], ...] = ()
     groups: tuple[tuple[str, ...], ...] = ()
+    origins: Mapping[str, str] = field(default_factory=dict)
 
     @classmethod
     def of(cls, study: Study) -> "Duty | None":
@@ -98,7 +100,21 @@ class Duty:
             (response.point, response.figure) for response in study.file.response if isinstance(response, PointResponse)
         ]
         overrides = {name: sets[name] for name in study.shares}
-        return cls(study.shares, overrides, rules, tuple(limits)) if study.shares else None
+        origins = {point.name: point.origin for point in study.file.duty if point.origin is not None}
+        return cls(study.shares, overrides, rules, tuple(limits), origins=origins) if study.shares else None
+
+    def started(self, scenes: Mapping[str, Scene]) -> dict[str, Scene]:
+        """Scenes by point, with the start of their machine where it begins in another state. Raises InputError."""
+        found = dict(scenes)
+        for name, origin in self.origins.items():
+            if origin == AMBIENT:
+                found[name] = starting(scenes[name])
+                continue
+            paths = [key_path(override) for point in (name, origin) for override in self.overrides[point]]
+            stated = scenes[origin].model_dump(mode="json", exclude_unset=True)
+            point = {".".join(path): _entry(stated, path) for path in paths}
+            found[name] = starting(scenes[name], point=point)
+        return found
 
     @property
     def relative(self) -> bool:
@@ -172,6 +188,13 @@ class Duty:
         return np.array([math.fsum(self.shares[name] for name in group) for group in groups])
 
 
+def _entry(tables: Any, path: Sequence[str]) -> Any:
+    """Entry of nested tables; None where they have none."""
+    for key in path:
+        tables = tables.get(key) if isinstance(tables, Mapping) else None
+    return tables
+
+
 @dataclass(frozen=True)
 class DutyScenes:
     """A run over a duty: a scene by name of each point.
@@ -205,7 +228,10 @@ def over_points(duty: Duty | None, scenes: Callable[[Sequence[str]], list[Scene 
     for row in zip(*columns, strict=True):
         possible = {name: scene for name, scene in zip(duty.shares, row, strict=True) if isinstance(scene, Scene)}
         faults = [f"at {name}: {fault}" for name, fault in zip(duty.shares, row, strict=True) if isinstance(fault, str)]
-        runs.append(faults[0] if faults else DutyScenes(duty, possible))
+        try:
+            runs.append(faults[0] if faults else DutyScenes(duty, duty.started(possible)))
+        except InputError as error:
+            runs.append(error.faults[0])
     return runs
 
 

@@ -2,15 +2,16 @@
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple, Self, TypeVar
 
 from rbdyn.base.blocks import Column, Sheet, columns_of, within
 from rbdyn.base.files import read_record, write_json
 from rbdyn.base.notes import Note, Notes
 from rbdyn.base.records import Record, derived, nullable, shown, spread, written
 from rbdyn.base.words import Brief, Figure, counted, error_alone, quantity, value_alone
+from rbdyn.clearances import DIFFERENCE
 from rbdyn.verdict.replicates import CageVerdict
 
 if TYPE_CHECKING:
@@ -180,12 +181,49 @@ TEMPERATURES = {
 }
 
 
-# Figures of a start, and the part of it that each is of.
+class StartFigure(NamedTuple):
+    """A figure of a start: its ``name`` among the ranges, its ``place`` in the JSON of a start, meaning, and which value is worst."""
+
+    name: str
+    place: str
+    meaning: str
+    worst: Literal["largest", "least", "none"] = "largest"
+
+
+PRESSURE, SETTLING, SEIZING = "race_pressure_MPa", "time_to_steady_s", "share_of_seizure"
+_PLAYS = ("radial", "guide", "pocket")
 START_FIGURES = {
-    "start_radial_clearance_um": "radial_um",
-    "start_guide_clearance_um": "guide_um",
-    "start_pocket_clearance_um": "pocket_um",
-    "start_inner_minus_outer_K": "temperature_difference_K",
+    **{
+        f"start_{name}_clearance_um": StartFigure(
+            f"{name}_um", f"{name}_um.least", f"least {name} clearance while the cold machine warms", "least"
+        )
+        for name in _PLAYS
+    },
+    "start_inner_minus_outer_K": StartFigure(
+        DIFFERENCE,
+        "temperature_difference_K",
+        "largest lead of the inner ring over the outer one while the cold machine warms",
+    ),
+    **{
+        f"start_{name}_time_s": StartFigure(
+            f"{name}_um_time_s",
+            f"{name}_um.time_s",
+            f"time of the least {name} clearance; without a minimum 0 or the time to steady",
+            "none",
+        )
+        for name in _PLAYS
+    },
+    "start_time_to_steady_s": StartFigure(
+        SETTLING,
+        SETTLING,
+        "time from which on the temperatures of the warming machine stay within 1 K of the last ones",
+    ),
+    "start_race_pressure_MPa": StartFigure(
+        PRESSURE, PRESSURE, "largest pressure of the races where the radial clearance is least while the machine warms"
+    ),
+    "start_share_of_seizure": StartFigure(
+        SEIZING, SEIZING, "share of the input sets of the heat balance in which a part seizes while the machine warms"
+    ),
 }
 
 
@@ -224,8 +262,10 @@ class StartResult(Record, kw_only=True):
     - ``axial_load_N`` and ``contact_pressure_MPa``: largest ones of a ball bearing, which has no cage here, and no ``moments``
     - ``temperature_difference_K``: largest lead of the inner ring over the outer one; ``time_to_steady_s``: from which on all
       temperatures stay within 1 K of the last ones, None without a steady state
-    - ``race_pressure_MPa``: largest pressure where the radial clearance is least, None where some is left
-    - ``ranges``: 5, 50 and 95 % of figures over the ``inputs``, and ``share_of_seizure`` of the input sets
+    - ``race_pressure_MPa``: largest pressure of the races where the radial clearance is least, None where that is impossible
+    - ``quantities``: figures of a roller bearing by ``START_FIGURES``, with errors
+    - ``ranges``: 5, 50 and 95 % of figures over the ``inputs``, ``share_of_seizure`` of the input sets, and
+      ``share_with_minimum`` of them by clearance; without a minimum its time is 0 or that to steady
     - ``path``: columns over time; with the capacities they satisfy C dT/dt = heat - what the conductances carry off
     """
 
@@ -239,9 +279,11 @@ class StartResult(Record, kw_only=True):
     temperature_difference_K: Quantity  # noqa: N815
     time_to_steady_s: float | None
     race_pressure_MPa: float | None  # noqa: N815
+    quantities: dict[str, Quantity] = field(default_factory=dict)
     ranges: dict[str, tuple[float, ...]]
     inputs: tuple[str, ...]
     share_of_seizure: float
+    share_with_minimum: dict[str, float] = field(default_factory=dict)
     capacities_J_K: dict[str, float]  # noqa: N815
     boundaries_C: dict[str, float]  # noqa: N815
     moments: tuple[StartMoment, ...]
@@ -250,7 +292,10 @@ class StartResult(Record, kw_only=True):
     @property
     def lost_clearance(self) -> Notes:
         """A note where the radial clearance is lost on the way, or can be over the inputs."""
-        play, low = getattr(self, START_FIGURES["start_radial_clearance_um"]), self.ranges.get("radial_um", (0.0,))[0]
+        play, low = (
+            getattr(self, START_FIGURES["start_radial_clearance_um"].name),
+            self.ranges.get("radial_um", (0.0,))[0],
+        )
         if play.least.value < 0.0:
             when = "" if play.time_s is None else f" after {play.time_s:.3g} s"
             return (Note("clearance", f"start: the radial clearance falls to {play.least.value:.0f} µm{when}"),)
@@ -260,12 +305,10 @@ class StartResult(Record, kw_only=True):
     @property
     def figures(self) -> dict[str, Quantity]:
         """Figures that a study or a sweep may name, by ``START_FIGURES`` and ``BALL_START_FIGURES``."""
-        parts = {key: getattr(self, name) for key, name in (START_FIGURES | BALL_START_FIGURES).items()}
-        return {
-            key: getattr(part, "least", getattr(part, "greatest", part))
-            for key, part in parts.items()
-            if part is not None
-        }
+        names = {key: figure.place.removesuffix(".least") for key, figure in START_FIGURES.items()} | BALL_START_FIGURES
+        parts = {key: getattr(self, name, None) for key, name in names.items()}
+        found = {key: getattr(part, "least", getattr(part, "greatest", part)) for key, part in parts.items()}
+        return {key: part for key, part in found.items() if isinstance(part, Quantity)} | self.quantities
 
 
 class FigureOf:

@@ -325,8 +325,8 @@ def at_point(point: str, figure: str) -> str:
 
 
 def alike(points: Sequence[DutyPoint]) -> bool:
-    """Whether all points have the same overrides, in whatever order."""
-    return len({frozenset(point.set) for point in points}) <= 1
+    """Whether all points have the same overrides, in whatever order, and begin alike."""
+    return len({(frozenset(point.set), point.origin) for point in points}) <= 1
 
 
 def shares_of(points: Sequence[DutyPoint]) -> dict[str, float]:
@@ -352,11 +352,6 @@ def duty_faults(
             if key in response.model_fields_set
         )
         return
-    yield from (
-        f"duty.from of {point.name}: a study has each point steady; leave it out, or state [thermal.start] in the scene"
-        for point in points
-        if point.origin is not None
-    )
     if not has_scene:
         yield "duty: there is no scene whose keys it can set; add [scene]"
     yield from point_faults(points, normalise, claims)

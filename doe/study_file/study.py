@@ -76,7 +76,7 @@ class Fitted(Strict):
 
 
 # Figures of a start by their place in the JSON of a result, such as start.radial_um.least.
-PLACES = {f"start.{part}{'.least' * part.endswith('_um')}": key for key, part in START_FIGURES.items()}
+PLACES = {f"start.{figure.place}": key for key, figure in START_FIGURES.items()}
 
 
 class Response(Fitted, OverDuty):

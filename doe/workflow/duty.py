@@ -53,6 +53,7 @@ class AtPoint(Record):
     own: OwnPick | None
     own_note: str
     operating_clearances_mm: dict[str, dict[str, float]] = field(default_factory=dict)
+    origin: str | None = keyed("from", default=None)
 
 
 class WorstPoint(Record):
@@ -119,7 +120,10 @@ def duty_answer(study: Problem, runs: Runs, confirmed: Mapping[str, Confirmed]) 
             {figure: SimulatedValue.of(quantity) for figure, quantity in end.at_points[name].items()}
             for end in (baseline, pick)
         )
-        points.append(AtPoint(name, study.shares[name], [*point.set], before, after, gains(here, *ends), own, note))
+        at_ends = gains(here, *ends)
+        points.append(
+            AtPoint(name, study.shares[name], [*point.set], before, after, at_ends, own, note, origin=point.origin)
+        )
     aggregate: dict[str, str] = {
         response.name: response.aggregate for response in study.file.response if not isinstance(response, PointResponse)
     }

@@ -251,13 +251,18 @@ class Problem(Study):
                 f"{self.path}: factor.key = {fault}"
                 for fault in first_guess_faults(scene.thermal, scene.lubricant, keys)
             )
-            refuse(
-                f"{self.path}: response.name = {name!r}: {fault}"
-                for name in self.figures
-                if (fault := why_missing(scene, name))
-            )
+            if self.duty is None or not self.duty.origins:
+                self._refuse_missing(scene)
             self.built[kind, *texts] = scene
         return self.built[kind, *texts]
+
+    def _refuse_missing(self, scene: Scene, where: str = "") -> None:
+        """Raises InputError for figures of the study that a scene has not."""
+        refuse(
+            f"{self.path}: response.name = {name!r}{where}: {fault}"
+            for name in self.figures
+            if (fault := why_missing(scene, name))
+        )
 
     def over_duty(
         self,
@@ -290,6 +295,10 @@ class Problem(Study):
             if fault not in everywhere
         ]
         refuse([*sorted(everywhere), *at_points])
+        if self.duty.origins:
+            points = self.duty.started(points)
+            for name, at_point in points.items():
+                self._refuse_missing(at_point, f" at {name}")
         return DutyScenes(self.duty, points, baseline or {}, baseline_errors)
 
     @cached_property

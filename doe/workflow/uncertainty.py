@@ -38,11 +38,11 @@ from rbdyn.base.faults import LONGEST_NAME, RunError, one_line, refuse
 from rbdyn.base.notes import Note, Notes
 from rbdyn.base.records import Record, derived, outside_json, spread
 from rbdyn.base.words import are, counted
-from rbdyn.dynamics.figures import FIGURES
+from rbdyn.dynamics.figures import FIGURES, of_kind, why_missing
 from rbdyn.result import TEMPERATURES, Quantity, SimulationResult
 from rbdyn.scene.unknown import UnknownInput
 
-# Outputs of every scene; those with a heat balance also have their temperatures.
+# Outputs of every scene; those with a heat balance also have their temperatures, those with a start its least clearances.
 OUTPUTS = tuple(figure.key for figure in FIGURES if figure.judged)
 # Fresh input sets of the emulator, and most input sets that run.
 FRESH, MOST = 8192, 512
@@ -182,7 +182,9 @@ def _case_of(path: Path, overrides: Sequence[str], figures: Sequence[str] = ()) 
         if name not in names
     )
     heat = () if case.scene.thermal is None else tuple(TEMPERATURES)
-    return replace(case, outputs=tuple(dict.fromkeys((*OUTPUTS, *heat, *figures))))
+    least = (figure.key for figure in of_kind("start") if figure.worst == "least")
+    plays = (key for key in least if why_missing(case.scene, key) is None)
+    return replace(case, outputs=tuple(dict.fromkeys((*OUTPUTS, *heat, *plays, *figures))))
 
 
 def _varying(case: Case, sets: Sets, idle: dict[str, float]) -> tuple[Case, Sets]:

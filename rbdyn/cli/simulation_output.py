@@ -264,12 +264,13 @@ def _start_row(start: StartResult, words: str, name: str, extreme: Quantity, tim
 
 
 def _when(start: StartResult, name: str, extreme: Quantity, time: float | None) -> str:
-    """When a figure is extreme; times over the inputs only where nearly all of these have an extreme inside."""
+    """When a figure is extreme; times over the inputs, and the share of these that have a minimum."""
     if time is None:
         first, last = (abs(start.path["figures"][name][place] - extreme.value) for place in (0, -1))
         return "at the start" if first <= last else "at the end"
-    times = start.ranges.get(f"{name}_time_s")
-    return f"{shown(time, 3)} ({range_ends(times) if times else 'not always a minimum'})"
+    times, share = start.ranges.get(f"{name}_time_s"), start.share_with_minimum.get(name)
+    few = "" if share in (None, 1.0) else f"; a minimum in {100.0 * share:.0f} % of the input sets"
+    return f"{shown(time, 3)} ({range_ends(times) if times else 'not always a minimum'}{few})"
 
 
 def _start_sentence(start: StartResult) -> str:
@@ -279,9 +280,8 @@ def _start_sentence(start: StartResult) -> str:
     if start.time_to_steady_s is not None and start.reason is None:
         times = start.ranges.get("time_to_steady_s")
         steady = f"steady after {shown(start.time_to_steady_s, 3)} s{f' ({range_ends(times)})' if times else ''}"
-    pressure = (
-        "" if start.race_pressure_MPa is None else f"; races reach {start.race_pressure_MPa:.0f} MPa without clearance"
-    )
+    lost = start.radial_um.least.value <= 0.0 and start.race_pressure_MPa is not None
+    pressure = f"; races reach {start.race_pressure_MPa:.0f} MPa without clearance" if lost else ""
     return (
         f"start: inner ring up to {with_error(lead.value, lead.stated_error)} K ({range_ends(spread)}) warmer than the outer ring; "
         f"{steady}{pressure}"

@@ -475,7 +475,7 @@ def why_missing(scene: "Scene", key: str) -> str | None:
     """Why a scene has no such figure of damage, stiffness or a start, with the fix; None where it has."""
     if key in START_FIGURES and (scene.thermal is None or scene.thermal.start is None):
         return "the scene has no [thermal.start]; add that table to its file or choose another figure"
-    if START_FIGURES.get(key) == "guide_um" and scene.cage.guidance == "roller":
+    if key in START_FIGURES and "guide" in key and scene.cage.guidance == "roller":
         return "no ring guides the cage; choose another figure"
     figure = next((figure for figure in FIGURES if figure.key == key), None)
     if figure is None:
@@ -517,16 +517,8 @@ HEAT = tuple(
     for key, node in TEMPERATURES.items()
 )
 START = tuple(
-    Figure(
-        key,
-        "largest lead of the inner ring over the outer one while the cold machine warms"
-        if key.endswith("_K")
-        else f"least {name.partition('_')[0]} clearance while the cold machine warms",
-        kind="start",
-        source=(name,),
-        worst="largest" if key.endswith("_K") else "least",
-    )
-    for key, name in START_FIGURES.items()
+    Figure(key, figure.meaning, kind="start", source=(figure.place,), worst=figure.worst)
+    for key, figure in START_FIGURES.items()
 )
 _CONTACTS = ("max_pressure_MPa", "central_film_um", "minimum_film_um", "lambda_ratio")
 PARTS = (

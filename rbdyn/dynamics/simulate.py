@@ -37,6 +37,7 @@ from rbdyn.losses import POWER_TERMS
 from rbdyn.mounting.cage import OperatingClearance
 from rbdyn.result import SimulationResult
 from rbdyn.scene import Scene, rollers_only
+from rbdyn.scene.start import point_before
 
 # Above this relative gap of the power balance a note asks for a tighter tolerance.
 LARGEST_POWER_GAP = 0.005
@@ -82,6 +83,7 @@ def simulate(
     if scene.thermal is not None:
         from rbdyn.dynamics.temperatures import with_temperatures
 
+        point_before(scene)  # A faulty one is refused before anything runs.
         balanced = with_temperatures(scene, run, _gather, progress)
         if scene.thermal.start is None:
             return balanced.result

@@ -3,8 +3,8 @@
 The first moments are the cold machine and its steady state. Another is simulated in the first stretch of the course where a film is
 15 K, a clearance 10 % of the cold one, or speed or load a factor from the nearest one; each makes the course anew
 (``rbdyn.thermal.start``). Errors: the root sum of squares of what the scatter of each moment's power loss moves, and, for the
-interpolation, the sum of what leaving out each moment in between moves. Ranges over the inputs of the balance, with the masses of
-housing and shaft, are those of as many courses.
+interpolation, what leaving out every other moment moves. Ranges over the inputs of the balance, with the masses of housing and
+shaft, are those of as many courses.
 """
 
 import math
@@ -17,21 +17,42 @@ import numpy as np
 from rbdyn.base.arrays import Array
 from rbdyn.base.faults import RPM, InputError, RunError
 from rbdyn.base.notes import Note, Notes, status_notes
+from rbdyn.base.records import finite
 from rbdyn.clearances import DIFFERENCE
 from rbdyn.dynamics.figures import POWER_LOSS
 from rbdyn.dynamics.parameters.heat import loss_levels, term_shares
-from rbdyn.dynamics.parameters.start import at_point, capacities, clearances_at, seats_of, turning_speed
+from rbdyn.dynamics.parameters.start import (
+    Machine,
+    Path,
+    Simulated,
+    at_point,
+    capacities,
+    clearances_at,
+    seats_of,
+    turning_speed,
+)
 from rbdyn.dynamics.parameters.state import load_distribution
 from rbdyn.dynamics.parameters.validity import race_report
 from rbdyn.dynamics.statistics.metrics import quantity, work_done
-from rbdyn.dynamics.temperatures import Balance, Balanced
-from rbdyn.result import LeastClearance, Quantity, SimulationResult, StartMoment, StartResult
+from rbdyn.dynamics.temperatures import Balance, Balanced, verdict_of
+from rbdyn.result import (
+    PRESSURE,
+    SEIZING,
+    SETTLING,
+    START_FIGURES,
+    LeastClearance,
+    Quantity,
+    SimulationResult,
+    StartMoment,
+    StartResult,
+)
 from rbdyn.scene import Scene
-from rbdyn.scene.input_ranges import QUANTILES, STARTING, course_ranges, input_sets, varied_inputs
-from rbdyn.scene.thermal import Temperatures, Thermal, at_temperatures, ceilings
+from rbdyn.scene.input_ranges import QUANTILES, SETS, STARTING, input_sets, varied_inputs
+from rbdyn.scene.start import point_before
+from rbdyn.scene.thermal import Temperatures, at_temperatures, ceilings
 from rbdyn.thermal.fixed_point import State
 from rbdyn.thermal.losses import HOTTEST
-from rbdyn.thermal.network import INNER, NODES, OIL, OUTER, ROLLERS, Boundaries, Conductances
+from rbdyn.thermal.network import INNER, NODES, OIL, OUTER, ROLLERS
 from rbdyn.thermal.start import (
     HOUSING,
     MOVING,
@@ -42,12 +63,11 @@ from rbdyn.thermal.start import (
     Course,
     Law,
     Moment,
-    Seats,
     Warming,
     columns,
     law_of,
-    least_of,
-    settling_time,
+    leasts_of,
+    settled_times,
     slowest,
     warming,
     warming_conductances,
@@ -56,6 +76,8 @@ from rbdyn.thermal.start import (
 
 # Short simulations at most, and failures of them: next to a seizure they take long and fail.
 MOST_SIMULATIONS, MOST_FAILURES = 10, 2
+# Moments from which a seizure is known where each half of them gives it too.
+SURE = 4
 # Distances from a simulated moment at most: of a film [K], of a clearance over the cold one and at least [um], of the logarithms of
 # speed and load.
 FILM_REACH, CLEARANCE_REACH, LEAST_REACH, POINT_REACH = 15.0, 0.1, 2.5, 0.35
@@ -67,65 +89,12 @@ FAR = 2.0
 ROUGH = 1e-5
 
 
-class Simulated(NamedTuple):
-    """A simulated moment: the ``moment`` of the law, its time [s], speed [rad/s], load [N], conductances, and its power's error."""
-
-    moment: Moment
-    time: float | None
-    speed: float
-    load: float
-    conductances: Conductances
-    seats: Seats
-    scatter: float
-
-
 class Failure(NamedTuple):
     """A moment whose simulation failed: its time [s], temperatures (6,) [C], and why."""
 
     time: float
     nodes: Array
     reason: str
-
-
-class Machine(NamedTuple):
-    """What stays over a start: scene, scene at temperatures, capacities (6,) [J/K], course, temperatures at the start (6,), state.
-
-    ``end``: time after which the slowest node is steady [s].
-    """
-
-    scene: Scene
-    hot: Scene
-    thermal: Thermal
-    capacities: Array
-    course: Course
-    cold: Array
-    state: State
-    boundaries: Boundaries
-    end: float
-
-    def clearances(self, rows: Warming, thermal: Thermal | None = None) -> tuple[dict[str, Array], dict[str, Array]]:
-        """Clearances [um] by name over time, and what is left of those that may not be lost."""
-        speeds = self.course.at(rows.times)[0] / turning_speed(self.scene)
-        ratios = speeds.reshape(-1, *[1] * (rows.temperatures.ndim - 2))
-        return clearances_at(self.hot, thermal or self.thermal, rows.temperatures, ratios)
-
-
-class Path(NamedTuple):
-    """A course of temperatures with its clearances [um] and the lead of the inner ring [K] by name, until a part seizes.
-
-    ``seizing``: the clearance that is lost at the end, if any.
-    """
-
-    rows: Warming
-    figures: dict[str, Array]
-    seizing: str | None
-
-    def least(self, name: str) -> tuple[float, float, bool]:
-        """As ``least_of``; of the lead of the inner ring, the largest."""
-        if name != DIFFERENCE:
-            return least_of(self.rows.times, self.figures[name])
-        value, time, inside = least_of(self.rows.times, -self.figures[name])
-        return -value, time, inside
 
 
 def with_start(balanced: Balanced) -> SimulationResult:
@@ -159,14 +128,16 @@ def _status(result: SimulationResult, start: str) -> str:
 def _start(balanced: Balanced) -> tuple[StartResult, Notes, list[Balance]]:
     """The start with its notes, and the balances that simulated for it. Raises InputError where the cold bearing is impossible."""
     balance, state = balanced.balance, balanced.path[-1]
-    machine = _machine(balance.scene, state)
-    runs, failures = list[Balance](), list[Failure]()
+    runs, failures, before = list[Balance](), list[Failure](), _parts_before(balance)
+    machine = _machine(balance.scene, state, before[0])
     first = _first_time(machine.course)
     simulated = [_steady_moment(machine), _moment(machine, balance, runs, first, machine.cold)]
     while True:
         law = _law(machine, simulated)
         path = _path(machine, law)
         place, distance = _farthest(machine, law, path, failures)
+        if _seizures(machine, law, path, simulated):
+            distance = 0.0
         if distance <= 1.0 or len(runs) >= MOST_SIMULATIONS or len(failures) >= MOST_FAILURES:
             break
         time, nodes = float(path.rows.times[place]), path.rows.temperatures[place]
@@ -175,14 +146,27 @@ def _start(balanced: Balanced) -> tuple[StartResult, Notes, list[Balance]]:
         except (InputError, RunError) as error:
             failures.append(Failure(time, nodes, str(error).partition(";")[0]))
     start, notes = _result(machine, law, path, simulated, distance)
-    return start, (*notes, *_failure_notes(failures)), runs
+    return start, (*notes, *_failure_notes(failures)), [*before[1], *runs]
 
 
-def _machine(scene: Scene, state: State) -> Machine:
+def _parts_before(balance: Balance) -> tuple[list[float] | None, list[Balance]]:
+    """Temperatures of the parts at the start [C] where another operating point gives them, by short runs. Raises InputError, RunError."""
+    scene = point_before(balance.scene)
+    if scene is None:
+        return None, []
+    before = Balance(scene, balance.simulate)
+    verdict = verdict_of(before)
+    if not verdict.steady:
+        raise RunError(f"the operating point before it has no steady temperatures: {verdict.status}")
+    nodes = verdict.temperatures.tolist()
+    return [*nodes, nodes[OUTER], nodes[INNER]], [before]
+
+
+def _machine(scene: Scene, state: State, before: Sequence[float] | None) -> Machine:
     thermal, hot = scene.thermal, state.run.hot
     assert thermal is not None and thermal.start is not None
     start = thermal.ambient_C if thermal.start.from_C is None else thermal.start.from_C
-    cold = np.array(thermal.start.from_parts_C or [start] * len(WARMING_NODES), dtype=np.float64)
+    cold = np.array(before or thermal.start.from_parts_C or [start] * len(WARMING_NODES), dtype=np.float64)
     course = thermal.start.course(turning_speed(scene), scene.operation.radial_load_N)
     parts, boundaries = capacities(hot, thermal), state.model.boundaries
     whole, _ = warming_network(warming_conductances(state.model.conductances, seats_of(hot)), boundaries)
@@ -301,37 +285,64 @@ def _farthest(machine: Machine, law: Law, path: Path, failures: Sequence[Failure
 def _result(
     machine: Machine, law: Law, path: Path, simulated: Sequence[Simulated], distance: float
 ) -> tuple[StartResult, Notes]:
-    times, steady = path.rows.times, path.rows.temperatures[-1]
     status, reason = _verdict(machine, law, path)
+    if seizures := _seizures(machine, law, path, simulated):
+        reason += f", by half of the simulations after {seizures[0]:.3g} to {seizures[-1]:.3g} s"
+    values, ranges = _figures(machine, path.rows, path.figures), _ranges(machine, law, path, simulated)
+    settled = status in ("steady", "too hot")
+    pressure, growth = _race_pressure(machine, path)
+    values |= {PRESSURE: np.array(pressure), SEIZING: np.array(ranges.seizing)}
     errors = _errors(machine, law, path, simulated)
-    values = {name: path.least(name) for name in path.figures}
-    quantities = {name: Quantity(values[name][0], *errors[name], float(len(simulated)), None) for name in path.figures}
-    after = machine.course.times[-1]
-    settled = settling_time(times, path.rows.temperatures, steady, STEADY) if status in ("steady", "too hot") else None
+    errors[PRESSURE] = Errors(*(growth * error for error in errors["radial_um"]))
+    errors[SEIZING] = Errors(_share_error(ranges.seizing), 0.0)
+    figures = {
+        key: Quantity(float(values[place]), *errors[place], float(len(simulated)), None)
+        for key, figure in START_FIGURES.items()
+        if (place := figure.name) in values and math.isfinite(values[place]) and (settled or not place.endswith("_s"))
+    }
+    least = {figure.name: figures[key] for key, figure in START_FIGURES.items() if key in figures}
     plays = {
-        name: LeastClearance(quantities[name], values[name][1] if values[name][2] else None)
+        name: LeastClearance(least[name], float(values[f"{name}_time_s"]) if values[f"{name}_inside"] else None)
         for name in path.figures
         if name != DIFFERENCE
     }
-    ranges = _ranges(machine, law, path, simulated)
     start = StartResult(
         status=status,
         reason=reason or None,
         radial_um=plays["radial_um"],
         guide_um=plays.get("guide_um"),
         pocket_um=plays["pocket_um"],
-        temperature_difference_K=quantities[DIFFERENCE],
-        time_to_steady_s=None if settled is None else max(settled, float(after)),
-        race_pressure_MPa=_race_pressure(machine, path),
+        temperature_difference_K=least[DIFFERENCE],
+        time_to_steady_s=float(values[SETTLING]) if settled else None,
+        race_pressure_MPa=finite(pressure),
+        quantities=figures,
         ranges=ranges.figures,
         inputs=ranges.inputs,
         share_of_seizure=ranges.seizing,
+        share_with_minimum=ranges.minima,
         capacities_J_K=dict(zip(WARMING_NODES, machine.capacities.tolist(), strict=True)),
         boundaries_C=machine.boundaries._asdict(),
         moments=tuple(_record(each) for each in simulated),
         path=_columns(machine, law, path, simulated, ranges.bands),
     )
     return start, _notes(machine, start, distance)
+
+
+def _figures(machine: Machine, rows: Warming, columns: Mapping[str, Array]) -> dict[str, Array]:
+    """Figures of each machine: least clearances with their times and whether they are minima, largest lead, time to steady.
+
+    A clearance without a minimum is least at the start, or when the machine is steady.
+    """
+    settled = settled_times(rows.times, rows.temperatures, STEADY)
+    found = {SETTLING: np.maximum(settled, machine.course.times[-1])}
+    for name, column in columns.items():
+        if name == DIFFERENCE:
+            found[name] = -leasts_of(rows.times, -column)[0]
+            continue
+        found[name], time, inside = leasts_of(rows.times, column)
+        found[f"{name}_inside"] = inside
+        found[f"{name}_time_s"] = np.where(inside, time, np.where(column[0] <= column[-1], 0.0, found[SETTLING]))
+    return found
 
 
 def _verdict(machine: Machine, law: Law, path: Path) -> tuple[str, str]:
@@ -362,37 +373,84 @@ def _verdict(machine: Machine, law: Law, path: Path) -> tuple[str, str]:
     return "steady", ""
 
 
-def _errors(
-    machine: Machine, law: Law, path: Path, simulated: Sequence[Simulated]
-) -> dict[str, tuple[float | None, float | None]]:
-    """Statistical and numerical error of each figure: by the scatter of the moments, and without each of those in between."""
+class Errors(NamedTuple):
+    """Statistical error of a figure, and that of the interpolation between moments."""
+
+    statistical: float
+    numerical: float
+
+
+def _halves(simulated: Sequence[Simulated]) -> list[list[Simulated]]:
+    """Moments without every other one of those in between, the odd or the even ones; without any in between the steady state alone."""
+    ends, between = simulated[:2], sorted(simulated[2:], key=lambda each: each.time or 0.0)
+    return [[*ends, *between[place::2]] for place in (0, 1)] if between else [[*ends[:1]]]
+
+
+def _seizures(machine: Machine, law: Law, path: Path, simulated: Sequence[Simulated]) -> list[float]:
+    """Moments [s] at which a part seizes by all moments and by each half of them; none unless all agree that it does."""
+    if len(simulated) < SURE or _verdict(machine, law, path)[0] != "seizure":
+        return []
+    laws = [_law(machine, half) for half in _halves(simulated)]
+    paths = [(law, path), *((each, _path(machine, each)) for each in laws)]
+    agreed = all(_verdict(machine, *each)[0] == "seizure" for each in paths)
+    return sorted(float(each.rows.times[-1]) for _, each in paths) if agreed else []
+
+
+def _errors(machine: Machine, law: Law, path: Path, simulated: Sequence[Simulated]) -> dict[str, Errors]:
+    """Errors of each figure.
+
+    Statistical: root sum of squares of what the scatter of each moment's power moves. Interpolation: the larger change by leaving
+    out every other moment in between, the odd or the even ones, with exponents fitted to the others alone. These have twice the
+    spacing, so that a method of first order moves by its own error and one of second order by three times that. Of a least or largest
+    value it is the largest change of its column until then, for that at one time may vanish by chance, and no such value moves by more.
+    """
     scatter = np.diag([each.scatter for each in simulated])
     powers = law.powers * (1.0 + scatter[:, :, np.newaxis])
     many = np.broadcast_to(machine.capacities, (len(simulated), len(WARMING_NODES)))
-    moved = _extremes(machine, law._replace(powers=powers), many)
-    base = _extremes(machine, law, machine.capacities)
-    fewer = [_extremes(machine, law.without(place), machine.capacities) for place in range(2, len(simulated))]
-    errors = dict[str, tuple[float | None, float | None]]()
-    for name, value in base.items():
-        statistical = float(np.sqrt(((moved[name] - value) ** 2).sum()))
-        errors[name] = statistical, math.fsum(abs(float(other[name] - value)) for other in fewer)
-    return errors
+    (base, columns), (moved, _) = (
+        _rough(machine, *changed) for changed in ((law, machine.capacities), (law._replace(powers=powers), many))
+    )
+    coarse = [_rough(machine, _law(machine, half), machine.capacities) for half in _halves(simulated)]
+
+    def change(name: str, other: dict[str, Array], over_time: dict[str, Array]) -> float:
+        if name not in columns:
+            return abs(float(other[name] - base[name]))
+        both = np.array([columns[name], over_time[name]])[:, : len(path.rows.times)]
+        until = (both.argmax(axis=1) if name == DIFFERENCE else both.argmin(axis=1)).max()
+        return float(np.abs(both[1] - both[0])[: until + 1].max())
+
+    return {
+        name: Errors(float(np.sqrt(((moved[name] - value) ** 2).sum())), max(change(name, *each) for each in coarse))
+        for name, value in base.items()
+        if not name.endswith("_inside")
+    }
 
 
-def _extremes(machine: Machine, law: Law, capacities: Array) -> dict[str, Array]:
-    """Least clearances and the largest lead of each machine."""
+def _share_error(share: float) -> float:
+    """Half-width of the 95 % interval of a share of ``SETS`` (Agresti and Coull)."""
+    count = SETS + 4.0
+    middle = (share * SETS + 2.0) / count
+    return 1.96 * math.sqrt(middle * (1.0 - middle) / count)
+
+
+def _rough(machine: Machine, law: Law, capacities: Array) -> tuple[dict[str, Array], dict[str, Array]]:
+    """Figures of each machine that does not end early, and its columns over time."""
     rows = _course_of(machine, law, capacities, ROUGH)
-    figures = _with_lead(rows, machine.clearances(rows)[0], len(rows.times))
-    return {name: column.max(axis=0) if name == DIFFERENCE else column.min(axis=0) for name, column in figures.items()}
+    columns = _with_lead(rows, machine.clearances(rows)[0], len(rows.times))
+    return _figures(machine, rows, columns), columns
 
 
 class InputRanges(NamedTuple):
-    """Ranges of figures, bands of columns over time (two rows each), the inputs, and the share of the sets that seize."""
+    """Ranges of figures, bands of columns over time (two rows each), the inputs, and shares of the sets.
+
+    ``seizing``: share in which a part seizes; ``minima``: those in which each clearance has a minimum.
+    """
 
     figures: dict[str, tuple[float, ...]]
     bands: dict[str, Array]
     inputs: tuple[str, ...]
     seizing: float
+    minima: dict[str, float]
 
 
 def _ranges(machine: Machine, law: Law, path: Path, simulated: Sequence[Simulated]) -> InputRanges:
@@ -420,7 +478,10 @@ def _ranges(machine: Machine, law: Law, path: Path, simulated: Sequence[Simulate
     }
     seizing = np.any([(play <= 0.0).any(axis=0) for play in left.values()], axis=0)
     seizing = seizing | (rows.temperatures.max(axis=(0, 2)) > HOTTEST)
-    return InputRanges(course_ranges(rows, figures), bands, tuple(sets), float(np.mean(seizing)))
+    found = _figures(machine, rows, figures)
+    minima = {name: float(np.mean(found.pop(f"{name}_inside"))) for name in plays}
+    ranges = {name: tuple(np.quantile(column, QUANTILES).tolist()) for name, column in found.items()}
+    return InputRanges(ranges, bands, tuple(sets), float(np.mean(seizing)), minima)
 
 
 def _varied_network(machine: Machine, each: Simulated, ratios: Mapping[str, float]) -> tuple[Array, Array]:
@@ -430,25 +491,35 @@ def _varied_network(machine: Machine, each: Simulated, ratios: Mapping[str, floa
     return warming_network(conductances, machine.boundaries)
 
 
-def _race_pressure(machine: Machine, path: Path) -> float | None:
-    """Largest pressure of the races under their static loads where the radial clearance is least [MPa]; None where some is left."""
-    from rbdyn.dynamics.parameters.model import roller_bearing
+def _race_pressure(machine: Machine, path: Path) -> tuple[float, float]:
+    """Largest pressure of the races under their static loads where the radial clearance is least [MPa], and its change by 1 um of that.
 
+    NaN and 0 where the bearing is impossible there.
+    """
     column = path.figures["radial_um"]
     row = int(column.argmin())
-    if column[row] > 0.0:
-        return None
     speed, load = (float(value) for value in machine.course.at(path.rows.times[row]))
-    nodes = path.rows.temperatures[row]
     point = at_point(machine.scene, max(speed, SLOW * machine.course.speeds.max()), load)
-    seats = float(nodes[HOUSING]), float(nodes[SHAFT])
-    try:
-        hot = at_temperatures(point, Temperatures(*nodes[: len(NODES)].tolist()), seats)
-    except InputError:
-        return None
-    loads = load_distribution(hot, roller_bearing(hot), hot.operation.largest_load_N)
-    report = race_report(hot, float(loads.inner.max()), float(loads.outer.max()))
-    return max((race["max_pressure_MPa"] for race in report.values()), default=None)
+    found = list[tuple[float, float]]()
+    for warmer in (0.0, 1.0):
+        nodes = path.rows.temperatures[row] + warmer * np.eye(len(WARMING_NODES))[INNER]
+        try:
+            hot = at_temperatures(
+                point, Temperatures(*nodes[: len(NODES)].tolist()), tuple(nodes[len(NODES) :].tolist())
+            )
+        except InputError:
+            return math.nan, 0.0
+        # Contact laws and rollers are those of the steady state: only the raceways move.
+        bearing, raceways = machine.state.run.bearing, hot.geometry.raceways
+        races = (
+            race._replace(radius=radius) for race, radius in zip((bearing.outer, bearing.inner), raceways, strict=True)
+        )
+        loads = load_distribution(hot, bearing._replace(**dict(zip(("outer", "inner"), races, strict=True))), load)
+        report = race_report(hot, float(loads.inner.max()), float(loads.outer.max()))
+        pressure = max((race["max_pressure_MPa"] for race in report.values()), default=0.0)
+        found.append((pressure, 1e6 * hot.geometry.clearance))
+    (pressure, play), (other, tighter) = found
+    return pressure, abs((other - pressure) / (tighter - play)) if tighter != play else 0.0
 
 
 def _record(each: Simulated) -> StartMoment:

@@ -27,6 +27,7 @@ from rbdyn.base.tables.sheet import InputTable, Limits, listed, read_sheet
 from rbdyn.life.duty import SHARE_ROUNDING
 from rbdyn.scene import Scene
 from rbdyn.scene.keys import key_values, unknown_keys
+from rbdyn.scene.start import ORIGINS
 from rbdyn.scene.thermal import first_guess_faults
 from rbdyn.scene.uncertain import DECLARATIONS, SEEDS
 
@@ -57,8 +58,8 @@ class DutyPoint(Consistent):
     """Overrides of the scene's keys at this point, as "key=value": operation, temperatures, oil flow; not of factors and seeds."""
     origin: str | None = Field(None, alias="from")
     """State in which the machine is when this point begins: "ambient" for a cold machine, or the name of another point for its steady
-    temperatures. With it rbdyn simulate --duty follows temperatures and clearances until this point is steady, by [thermal.start];
-    without it the point is steady from the start."""
+    temperatures. With it rbdyn simulate --duty and studies follow temperatures and clearances until this point is steady, by
+    [thermal.start]; without it the point is steady from the start."""
 
     def faults(self) -> Iterator[str]:
         if ": " in self.name:
@@ -205,13 +206,15 @@ def duty_scenes(scene: Scene, points: Sequence[DutyPoint], source: str) -> list[
     return scenes
 
 
-def starting(scene: Scene, parts: Sequence[float] | None = None) -> Scene:
-    """The scene with the start of its machine from the temperatures of ``WARMING_NODES`` [C], None for its surroundings.
+def starting(scene: Scene, parts: Sequence[float] | None = None, point: Mapping[str, Any] | None = None) -> Scene:
+    """The scene with the start of its machine from its surroundings.
 
-    Raises InputError for a scene without [thermal].
+    ``parts``: from these temperatures of ``WARMING_NODES`` [C] instead; ``point``: from the steady ones of the scene with these values
+    of keys. Raises InputError for a scene without [thermal].
     """
     if scene.thermal is None:
         raise InputError([f"duty.{ORIGIN}: a start needs a heat balance; add [thermal] to the scene or leave it out"])
     stated = {} if scene.thermal.start is None else scene.thermal.start.model_dump(mode="json", exclude_none=True)
-    kept = {key: value for key, value in stated.items() if key not in ("from_C", "from_parts_C")}
-    return scene.changed({"thermal.start": kept if parts is None else {**kept, "from_parts_C": list(parts)}})
+    kept = {key: value for key, value in stated.items() if key not in ORIGINS}
+    origin = {"from_parts_C": parts and list(parts), "from_point": point and dict(point)}
+    return scene.changed({"thermal.start": kept | {key: value for key, value in origin.items() if value}})

@@ -2,16 +2,17 @@
 
 from collections.abc import Iterator
 from itertools import pairwise
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import Field
 
-from rbdyn.base.faults import Consistent, InSI, NonNegative, Positive, Strict
+from rbdyn.base.faults import Consistent, InputError, InSI, NonNegative, Positive, Strict
 from rbdyn.base.words import counted
 from rbdyn.scene.lubricant import THICKEST, Lubricant, OilCelsius
 from rbdyn.scene.operation import SLOWEST_RPM, Load
 
 if TYPE_CHECKING:
+    from rbdyn.scene import Scene
     from rbdyn.thermal.start import Course
 
 MOST_POINTS = 60
@@ -19,6 +20,8 @@ MOST_POINTS = 60
 MOST_OF_REFERENCE = 2.0
 # Longest schedule [s]: a week.
 LONGEST = 7.0 * 24.0 * 3600.0
+# Keys of [thermal.start] that state temperatures at the start.
+ORIGINS = ("from_C", "from_parts_C", "from_point")
 Pace = Annotated[float, Field(ge=0.0, le=1e6)]
 
 
@@ -69,6 +72,9 @@ class Start(Strict):
     from_parts_C: Annotated[list[OilCelsius], Field(min_length=6, max_length=6)] | None = None  # noqa: N815
     """Temperatures of oil, outer ring, inner ring, rollers, housing and shaft at the start, such as those of another operating point;
     instead of from_C."""
+    from_point: dict[str, Any] | None = None
+    """Keys of the scene with their values at another operating point, such as `{ "operation.inner_speed_rpm" = 800 }`: the machine begins
+    with the steady temperatures of that point, instead of from_C."""
     schedule: StartSchedule | None = None
     """Speed and load over time. Default: the operating point from the start on."""
     housing_widths: Positive = 1.7
@@ -103,10 +109,11 @@ def start_faults(
     """
     if start is None:
         return
+    stated = [f"thermal.start.{key}" for key in ORIGINS if getattr(start, key) is not None]
+    if len(stated) > 1:
+        yield f"{stated[0]} and {stated[1]} both state the temperatures at the start; leave one out"
     cold, name = (ambient, "thermal.ambient_C") if start.from_C is None else (start.from_C, "thermal.start.from_C")
     if start.from_parts_C is not None:
-        if start.from_C is not None:
-            yield "thermal.start.from_C and thermal.start.from_parts_C both state the temperatures at the start; leave one out"
         cold, name = start.from_parts_C[0], "thermal.start.from_parts_C, oil"
     oil = lubricant.at(cold)
     thickness = 1e6 * oil.viscosity / oil.density
@@ -123,3 +130,14 @@ def start_faults(
             f"thermal.start.schedule.speed_rpm: reaches {fastest:g}, above twice the reference speed of {reference_rpm:g} rpm; "
             "lower it or check its unit"
         )
+
+
+def point_before(scene: "Scene") -> "Scene | None":
+    """The scene at the operating point whose steady temperatures its machine has at the start; None without one. Raises InputError."""
+    start = None if scene.thermal is None else scene.thermal.start
+    if start is None or start.from_point is None:
+        return None
+    try:
+        return scene.changed({"thermal.start": None, **start.from_point})
+    except InputError as error:
+        raise InputError([f"thermal.start.from_point: {fault}" for fault in error.faults]) from None

@@ -275,10 +275,12 @@ def plain_values(scene: BaseModel) -> dict[str, Any]:
 
     Keys that a scene saves only where they differ from None are not among them.
     """
+    tables = {table: keys for table, keys in scene.model_dump(mode="json").items() if isinstance(keys, dict)}
+    nested = {f"{table}.{key}": value for table, keys in tables.items() for key, value in keys.items()}
+    tables |= {table: keys for table, keys in nested.items() if isinstance(keys, dict)}
     values = {
         f"{table}.{key}": LEFT_OUT if value is None else value
-        for table, keys in scene.model_dump(mode="json").items()
-        if isinstance(keys, dict)
+        for table, keys in tables.items()
         for key, value in keys.items()
     }
     for name in type(scene).model_fields:
@@ -300,5 +302,8 @@ def documented_of(scene: Scene) -> list[Documented]:
 
 
 def _has_entry(data: Mapping[str, Any], key: str) -> bool:
-    table, _, name = key.rpartition(".")
-    return isinstance(data.get(table), dict) and name in data[table]
+    *path, name = key.split(".")
+    table: Any = data
+    for part in path:
+        table = table.get(part) if isinstance(table, Mapping) else None
+    return isinstance(table, Mapping) and name in table

@@ -40,6 +40,8 @@ SETTLED = 16.0
 STEADY, MOVING = 1.0, 0.5
 # Speed and load, over the largest of a course, below which the power laws see no further fall, or logarithms have no end.
 SLOWEST, LIGHTEST = 1e-3, 1e-2
+# Depth of a minimum below the ends of its column, over the span of that: less is noise of the integration.
+LEAST_DIP = 1e-3
 # Least and largest exponents of viscosity, speed and load.
 LEAST_EXPONENTS, MOST_EXPONENTS = (0.0, 0.0, -1.0), (1.2, 4.0, 3.0)
 # Spread of the exponents about their priors, over that of the logarithm of a power.
@@ -223,11 +225,6 @@ class Law(NamedTuple):
 
         return net
 
-    def without(self, place: int) -> "Law":
-        """The law without one moment."""
-        fields = ("temperatures", "courses", "powers", "matrices", "sources")
-        return self._replace(**{name: np.delete(getattr(self, name), place, axis=0) for name in fields})
-
 
 def law_of(
     moments: Sequence[Moment],
@@ -382,19 +379,37 @@ def settling_time(times: Array, table: Array, steady: Array, within: float) -> f
     return float(times[away[-1] + 1]) if away[-1] + 1 < len(times) else None
 
 
-def least_of(times: Array, values: Array) -> tuple[float, float, bool]:
-    """Least of a column, its time [s], and whether it is a minimum inside, lower than both ends by more than a millionth.
+def settled_times(times: Array, table: Array, within: float) -> Array:
+    """First time [s] from which all columns of the ``table`` (rows, ..., n) stay ``within`` the last ones."""
+    moving = np.abs(table - table[-1]).max(axis=-1) > within
+    last = len(times) - 1 - moving[::-1].argmax(axis=0)
+    return np.where(moving.any(axis=0), times[np.minimum(last + 1, len(times) - 1)], times[0])
+
+
+def leasts_of(times: Array, values: Array) -> tuple[Array, Array, Array]:
+    """Least of each column (rows, ...), its time [s], and whether it is a minimum inside: lower than both ends by a share of the span.
 
     A parabola through three rows refines it.
     """
-    place = int(values.argmin())
-    span = float(values.max() - values.min())
-    inside = min(values[0], values[-1]) - values[place] > 1e-6 * span
-    if not 0 < place < len(values) - 1:
-        return float(values[place]), float(times[place]), bool(inside)
-    near, about = values[place - 1 : place + 2], times[place - 1 : place + 2]
-    curve = np.polyfit(about - about[1], near, 2)
-    if not curve[0] > 0.0:
-        return float(values[place]), float(times[place]), bool(inside)
-    shift = float(np.clip(-0.5 * curve[1] / curve[0], about[0] - about[1], about[2] - about[1]))
-    return float(np.polyval(curve, shift)), float(about[1] + shift), bool(inside)
+    least, place = values.min(axis=0), values.argmin(axis=0)
+    inside = np.minimum(values[0], values[-1]) - least > LEAST_DIP * np.ptp(values, axis=0)
+    if len(times) < 3:
+        return least, times[place], inside
+    middle = np.clip(place, 1, len(times) - 2)
+    (t0, t1, t2), (v0, v1, v2) = (
+        (times[middle + step] for step in (-1, 0, 1)),
+        (np.take_along_axis(values, (middle + step)[np.newaxis], 0)[0] for step in (-1, 0, 1)),
+    )
+    before, after = (v1 - v0) / (t1 - t0), (v2 - v1) / (t2 - t1)
+    bend = (after - before) / (t2 - t0)
+    refined = inside & (v1 <= v0) & (v1 <= v2) & (bend > 0.0)
+    bend = np.where(refined, bend, 1.0)
+    slope = before + bend * (t1 - t0)
+    shift = np.where(refined, -0.5 * slope / bend, 0.0)
+    return least + shift * (slope + bend * shift), times[place] + shift, inside
+
+
+def least_of(times: Array, values: Array) -> tuple[float, float, bool]:
+    """As ``leasts_of`` for one column."""
+    value, time, inside = leasts_of(times, values)
+    return float(value), float(time), bool(inside)

@@ -6,10 +6,12 @@ import pytest
 from conftest import ROOT
 from in_process import in_process
 
+from doe.duty import Duty, over_points
 from rbdyn import Scene, simulate
 from rbdyn.base.faults import InputError
 from rbdyn.dynamics.duty_simulation import DutySimulation, simulate_duty
 from rbdyn.scene.duty import duty_scenes, read_duty, starting
+from rbdyn.scene.start import point_before
 
 # Simulations of the heat alone, long enough for it.
 QUICK = {"turns": 20.0, "discard_turns": 10.0, "replicates": 2, "extend": False, "companion": False}
@@ -71,11 +73,37 @@ def test_faults_of_a_table(tmp_path, text, says):
     assert says in refused.value.faults[0]
 
 
-def test_a_start_needs_a_heat_balance_and_studies_have_none(tmp_path):
+def test_a_start_needs_a_heat_balance(tmp_path):
     """A scene without [thermal] is refused before anything runs, as are both kinds of temperatures at once."""
     points = read_duty(duty(tmp_path, "a,1,ambient,4000\n"))
     with pytest.raises(InputError, match=r"duty 'a': duty.from: a start needs a heat balance; add \[thermal\]"):
         duty_scenes(Scene.load(ROOT / "examples" / "cylindrical_roller.toml"), points, "duty")
+
+
+def test_points_of_a_study_start_as_stated(scene, tmp_path):
+    """A study gives each point the start that its duty states: from ambient, or with the keys of the other point, as stated there."""
+    points = {"idle": ["operation.inner_speed_rpm=1500"], "full": ["operation.radial_load_N=5000"]}
+    duty = Duty(dict.fromkeys(points, 0.5), points, {}, origins={"idle": "ambient", "full": "idle"})
+    (run,) = over_points(duty, lambda overrides: [scene.overridden(overrides)])
+    idle, full = (run.scenes[name].thermal.start for name in points)
+    assert idle.from_point is None and idle.from_C is None
+    assert full.from_point == {"operation.inner_speed_rpm": 1500.0, "operation.radial_load_N": 4000.0}
+    before = point_before(run.scenes["full"])
+    assert before == scene.overridden(points["idle"]) and point_before(run.scenes["idle"]) is None
+    faulty = scene.changed({"thermal.start": {"from_point": {"operation.speed": 3.0}}})
+    with pytest.raises(InputError, match=r"thermal.start.from_point: .*operation.speed"):
+        simulate(faulty, notice=None)
+
+
+def test_start_from_another_point_has_its_temperatures(scene):
+    """The first row of a start from another operating point has the steady temperatures of that point, as a start from its parts."""
+    slow = {"operation.inner_speed_rpm": 2000.0}
+    found = simulate(scene.changed({"thermal.start": {"from_point": slow}}), workers=2, notice=None)
+    first = [column[0] for column in found.start.path["temperatures_C"].values()]
+    steady = simulate(scene.changed(slow), workers=2, notice=None).temperatures_C
+    assert first[:4] == pytest.approx([steady[node].value for node in ("oil", "outer", "inner", "rollers")], abs=0.5)
+    parts = simulate(scene.changed({"thermal.start": {"from_parts_C": first}}), workers=2, notice=None).start
+    assert parts.radial_um.least.value == pytest.approx(found.start.radial_um.least.value, abs=0.05)
 
 
 def test_both_temperatures_contradict(scene):

@@ -19,11 +19,16 @@ from rbdyn.base.faults import InputError
 from rbdyn.cli.app import app
 from rbdyn.dynamics import start as start_module
 from rbdyn.dynamics.figures import FIGURES, why_missing
+from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.parameters.start import capacities, clearances_at, seats_of
+from rbdyn.dynamics.parameters.state import load_distribution
+from rbdyn.dynamics.parameters.validity import race_report
 from rbdyn.mounting.rings import Ring, interface_pressure
 from rbdyn.properties.materials import Material
 from rbdyn.result import START_FIGURES, SimulationResult, StartResult, start_sheet
 from rbdyn.scene.thermal import Temperatures, at_temperatures, part_temperatures
+from rbdyn.scene.uncertain import Uncertain
+from rbdyn.scene.unknown import inputs_of
 from rbdyn.thermal.start import ROUGHNESS, WARMING_NODES
 
 # Simulations of the heat alone, long enough for it.
@@ -135,6 +140,17 @@ def test_unit_figures_of_a_start_are_responses(cold):
     start, responses = cold.start, cold.responses
     assert responses["start_radial_clearance_um"] == start.radial_um.least
     assert responses["start_inner_minus_outer_K"] == start.temperature_difference_K
+    assert responses["start_radial_time_s"].value == start.radial_um.time_s
+    assert responses["start_time_to_steady_s"].value == start.time_to_steady_s
+    # Without a minimum the least is at the start, when the cage is cold.
+    assert start.pocket_um.time_s is None and responses["start_pocket_time_s"].value == 0.0
+    assert start.share_with_minimum["pocket_um"] == 0.0 < start.share_with_minimum["radial_um"] < 1.0
+    assert (
+        responses["start_share_of_seizure"].value
+        == start.share_of_seizure
+        == 0.0
+        < responses["start_share_of_seizure"].error
+    )
     listed = {figure.key for figure in FIGURES if figure.kind == "start"}
     assert listed == set(START_FIGURES) <= set(responses_of(heats=False))
     assert all(why_missing(_scene(start={}), key) is None for key in listed)
@@ -154,6 +170,35 @@ def test_unit_study_names_a_start_as_the_json_does():
     assert limit.name == "start_radial_clearance_um" and limit.lower == 5.0
     lead = Response.model_validate({"name": "start.temperature_difference_K", "goal": "min"})
     assert lead.name == "start_inner_minus_outer_K"
+    for place, key in (("radial_um.time_s", "radial_time_s"), ("time_to_steady_s",) * 2, ("race_pressure_MPa",) * 2):
+        assert Response.model_validate({"name": f"start.{place}", "goal": "min"}).name == f"start_{key}"
+
+
+def test_oracle_race_pressure_where_clearance_is_least(cold):
+    """Oracle: the pressure is that of the bearing built anew at the temperatures of the moment, within the rows about it."""
+    start, path = cold.start, cold.start.path
+    row = int(np.argmin(path["figures"]["radial_um"]))
+    nodes = [path["temperatures_C"][node][row] for node in WARMING_NODES]
+    hot = at_temperatures(_scene(start={}), Temperatures(*nodes[:4]), tuple(nodes[4:]))
+    loads = load_distribution(hot, roller_bearing(hot), 4000.0)
+    races = race_report(hot, float(loads.inner.max()), float(loads.outer.max()))
+    pressure = max(race["max_pressure_MPa"] for race in races.values())
+    assert start.race_pressure_MPa == pytest.approx(pressure, rel=1e-4)
+    steady = max(cold.races[race]["max_pressure_MPa"] for race in ("inner", "outer"))
+    assert start.race_pressure_MPa < steady  # a smaller clearance spreads the load
+    assert 0.0 < cold.responses["start_race_pressure_MPa"].error < 0.02 * pressure
+
+
+def test_unit_widths_are_unknown_inputs():
+    """Unit: doe uncertainty draws the lengths of housing and shaft that warm, unless they are stated; without a start there are none."""
+
+    def drawn(tables: dict[str, Any]) -> list[str]:
+        inputs = inputs_of(Scene.from_dict(tables), tables, Uncertain())
+        return [entry.key for entry in inputs if entry.key.startswith("thermal.start")]
+
+    both = ["thermal.start.housing_widths", "thermal.start.shaft_widths"]
+    assert drawn(_tables(start={})) == both and drawn(_tables()) == []
+    assert drawn(_tables(start={"housing_widths": 2.0})) == both[1:]
 
 
 def test_unit_table_and_picture_of_a_start(cold, tmp_path):
@@ -168,18 +213,27 @@ def test_unit_table_and_picture_of_a_start(cold, tmp_path):
 
 
 @pytest.mark.slow
-def test_oracle_first_guess_and_spacing_do_not_matter(cold, monkeypatch):
-    """Oracle: another first guess of the balance, and moments half as far apart, give the same least clearance within its errors."""
-    least = cold.start.radial_um.least
-    guess = simulate(_scene(start={}, lubricant={"temperature_C": 45.0}), workers=2, notice=None).start.radial_um.least
-    assert abs(guess.value - least.value) < np.hypot(guess.error, least.error)
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        (),
+        ("NU2208", "--speed", "5000", "--load", "3000", "--oil", "ISO VG 32", "--ambient", "20"),
+        ("NU1014", "--speed", "3000", "--load", "5000", "--oil", "ISO VG 100", "--ambient", "20"),
+    ],
+)
+def test_oracle_first_guess_and_spacing_do_not_matter(arguments, monkeypatch):
+    """Oracle: another first guess of the balance, and moments half as far apart, give the same least clearance within stated errors."""
+    scenes = (_scene(*arguments, start={}, lubricant=guess) for guess in ({}, {"temperature_C": 45.0}))
+    usual, guess = (simulate(scene, workers=2, notice=None).start for scene in scenes)
     monkeypatch.setattr(start_module, "FILM_REACH", 7.5)
     monkeypatch.setattr(start_module, "CLEARANCE_REACH", 0.05)
     monkeypatch.setattr(start_module, "LEAST_REACH", 1.25)
     monkeypatch.setattr(start_module, "MOST_SIMULATIONS", 30)
-    dense = simulate(_scene(start={}), workers=2, notice=None).start
-    assert len(dense.moments) > len(cold.start.moments)
-    assert abs(dense.radial_um.least.value - least.value) < np.hypot(dense.radial_um.least.error, least.error)
+    dense = simulate(_scene(*arguments, start={}), workers=2, notice=None).start
+    assert len(dense.moments) > len(usual.moments)
+    least = usual.radial_um.least
+    for other in (guess.radial_um.least, dense.radial_um.least):
+        assert abs(other.value - least.value) < np.hypot(other.error, least.error)
 
 
 @pytest.mark.slow
@@ -200,6 +254,7 @@ def test_tight_cage_seizes_during_the_start():
     start = seized.start
     assert seized.thermal["status"] == "steady" and seized.clearance_um["guide"]["operating"] > 20.0
     assert seized.status == start.status == "seizure" and "the guide clearance of the cage is lost" in start.reason
+    assert "by half of the simulations after" in start.reason and not any("failed" in note for note in seized.notes)
     floor = 2.0 * _scene().model.land_film_floor_um
     guide = start.path["figures"]["guide_um"]
     assert guide[-1] <= floor + 1e-6 < guide[-2] and start.path["time_s"][-1] < 60.0

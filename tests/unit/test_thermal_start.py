@@ -14,8 +14,10 @@ from rbdyn.thermal.start import (
     Seats,
     law_of,
     least_of,
+    leasts_of,
     rows_of,
     seat,
+    settled_times,
     settling_time,
     slowest,
     warming,
@@ -229,6 +231,16 @@ def test_unit_rows_and_figures_of_a_course():
     assert least == pytest.approx(exact, rel=1e-4)
     assert not least_of(times, -times)[2] and least_of(times, -times)[1] == 3600.0
     table = 20.0 + 50.0 * -np.expm1(-times / 400.0)[:, np.newaxis]
-    assert settling_time(times, table, np.array([70.0]), 1.0) == pytest.approx(400.0 * np.log(50.0), rel=0.05)
     assert settling_time(times, table, np.array([90.0]), 1.0) is None
+    assert settling_time(times, table, table[-1], 1.0) == settled_times(times, table, 1.0)
+    assert settled_times(times, table, 1.0) == pytest.approx(400.0 * np.log(50.0), rel=0.05)
+    assert settled_times(times, table, 90.0) == 0.0
+    # Columns together have the bits of each alone, also where rows are few.
+    both = np.column_stack((play, -times))
+    for rows in (both, both[:2]):
+        together = leasts_of(times[: len(rows)], rows)
+        alone = [least_of(times[: len(rows)], column) for column in rows.T]
+        assert [tuple(map(float, each)) for each in zip(*together, strict=True)] == [
+            tuple(map(float, each)) for each in alone
+        ]
     assert seat(6.5e-3, 12.5e-6, 0.13, 0.9e-6) == pytest.approx(0.13 * 6.5e-3 / 13.4e-6)

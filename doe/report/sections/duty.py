@@ -180,7 +180,7 @@ def _points(duty: DutyAnswer) -> Table:
         (
             point.name,
             _percent(point.share),
-            ", ".join(point.overrides),
+            ", ".join([*point.overrides, *([f"from {point.origin}"] if point.origin else [])]),
             *(shown(hours[point.name], 3) for hours in lives),
         )
         for point in duty.points

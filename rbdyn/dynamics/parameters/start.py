@@ -1,4 +1,4 @@
-"""A cold roller bearing that warms: capacities of its parts, its seats, its clearances at temperatures, and its course."""
+"""A cold roller bearing that warms: capacities of its parts, seats, clearances at temperatures, course, and records of these."""
 
 import math
 from collections.abc import Mapping
@@ -13,8 +13,9 @@ from rbdyn.mounting.rings import MountedRings
 from rbdyn.scene import Scene
 from rbdyn.scene.fits import mounted_rings
 from rbdyn.scene.thermal import Temperatures, Thermal, part_temperatures
-from rbdyn.thermal.network import NODES
-from rbdyn.thermal.start import HOUSING, SHAFT, Seats, capacities_of, seats_between
+from rbdyn.thermal.fixed_point import State
+from rbdyn.thermal.network import NODES, Boundaries, Conductances
+from rbdyn.thermal.start import HOUSING, SHAFT, Course, Moment, Seats, Warming, capacities_of, seats_between
 
 # Names of clearances in JSON by those of a scene.
 NAMES = {"radial": "radial_um", "guide": "guide_um", "pocket": "pocket_um"}
@@ -96,3 +97,49 @@ def at_point(scene: Scene, speed: float, load: float) -> Scene:
     return scene.changed(
         {"operation.inner_speed_rpm": inner, "operation.outer_speed_rpm": outer, "operation.radial_load_N": load}
     )
+
+
+class Machine(NamedTuple):
+    """What stays over a start: scene, scene at temperatures, capacities (6,) [J/K], course, temperatures at the start (6,), state.
+
+    ``end``: time after which the slowest node is steady [s].
+    """
+
+    scene: Scene
+    hot: Scene
+    thermal: Thermal
+    capacities: Array
+    course: Course
+    cold: Array
+    state: State
+    boundaries: Boundaries
+    end: float
+
+    def clearances(self, rows: Warming, thermal: Thermal | None = None) -> tuple[dict[str, Array], dict[str, Array]]:
+        """Clearances [um] by name over time, and what is left of those that may not be lost."""
+        speeds = self.course.at(rows.times)[0] / turning_speed(self.scene)
+        ratios = speeds.reshape(-1, *[1] * (rows.temperatures.ndim - 2))
+        return clearances_at(self.hot, thermal or self.thermal, rows.temperatures, ratios)
+
+
+class Path(NamedTuple):
+    """A course of temperatures with its clearances [um] and the lead of the inner ring [K] by name, until a part seizes.
+
+    ``seizing``: the clearance that is lost at the end, if any.
+    """
+
+    rows: Warming
+    figures: dict[str, Array]
+    seizing: str | None
+
+
+class Simulated(NamedTuple):
+    """A simulated moment: the ``moment`` of the law, its time [s], speed [rad/s], load [N], conductances, and its power's error."""
+
+    moment: Moment
+    time: float | None
+    speed: float
+    load: float
+    conductances: Conductances
+    seats: Seats
+    scatter: float
