@@ -73,7 +73,7 @@ class Start(Strict):
     """Temperatures of oil, outer ring, inner ring, rollers, housing and shaft at the start, such as those of another operating point;
     instead of from_C."""
     from_point: dict[str, Any] | None = None
-    """Keys of the scene with their values at another operating point, such as `{ "operation.inner_speed_rpm" = 800 }`: the machine begins
+    """Keys of the scene with their values at another operating point, such as {"operation.inner_speed_rpm" = 800}: the machine begins
     with the steady temperatures of that point, instead of from_C."""
     schedule: StartSchedule | None = None
     """Speed and load over time. Default: the operating point from the start on."""
