@@ -89,10 +89,10 @@ def test_keys_are_those_of_a_scene_that_gives_all():
     tables = {name for name, value in scene.items() if isinstance(value, dict)}
     for table in tables:
         of_table = {name.split(".")[1].removesuffix("[]") for name in listed if name.startswith(f"{table}.")}
-        # A scene saves what tells its oil, and how that comes in, only where it is given.
+        # A scene saves what tells its oil, how that comes in, and whether it has a stiffness, only where it is given.
         oil = {"base_oil", "viscosity_index", "viscosities_C_mm2_s", "density_kg_m3", "supply", "film_temperature",
                "oil_flow_l_min", "oil_inlet_temperature_C", "oil_fraction_factor"}  # fmt: skip
-        outside_json = {"lubricant": oil, "mounting": {"width_mm"}}.get(table, set())
+        outside_json = {"lubricant": oil, "mounting": {"width_mm"}, "numerics": {"stiffness"}}.get(table, set())
         assert of_table - outside_json == set(scene[table]) - outside_json
 
 
