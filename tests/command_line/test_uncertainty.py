@@ -220,7 +220,9 @@ def test_balls_are_refused(tmp_path: Path) -> None:
 
 
 class _Result:
-    """A result of a simulation that never ran."""
+    """A result of a simulation that never ran and traced no cage."""
+
+    verdict = None
 
     def __init__(self, values: Sequence[float], error: float) -> None:
         names = ("impact_force_N", "whirl_deviation_ratio", "power_loss_W")
