@@ -77,7 +77,7 @@ class Answer(Mapping[str, Any]):
 
     def as_dict(self) -> dict[str, Any]:
         """JSON object of the command, which shares nothing with the answer."""
-        return copy.deepcopy(dict(self.record))
+        return {key: self[key] for key in self}
 
     def save(self, path: Path | str) -> None:
         """Write the JSON object of the command to a file, whole or not at all. Raises OSError."""

@@ -42,8 +42,8 @@ class RunsAnswer(Answer):
         where = "the table runs" if self.folder is None else "runs.csv"
         return [f"{failed} of {counted(len(self.runs), 'row')} failed; {where} says which and why"] if failed else []
 
-    def as_dict(self) -> dict[str, Any]:
-        return {**super().as_dict(), "rows": [run.as_dict() for run in self.runs]}
+    def __getitem__(self, key: str) -> Any:
+        return [run.as_dict() for run in self.runs] if key == "rows" else super().__getitem__(key)
 
     def blocks(self) -> list[Block]:
         from doe.report.sections.scene_runs import scene_run_blocks
@@ -148,7 +148,7 @@ def run_answer(
                 from rbdyn.base.records import save_rows
 
                 save_rows(lambda: (run.cells for run in runs), stage / "runs.csv")
-                write_json(stage / "runs.json", {**record, "rows": runs}, RowRun.as_dict)
+                write_json(stage / "runs.json", record, RowRun.as_dict)
                 return ["runs.csv", "runs.json"]
 
             written = write_with_report(output, identity, answer.blocks, write)
@@ -161,7 +161,7 @@ def _record(runs: "Sequence[RowRun]", notes: Sequence[Any], table: str) -> dict[
     failures = [run for run in runs if run.figures is None]
     return {
         "status": "failed" if failures else "ok",
-        "rows": [],
+        "rows": runs,
         "failures": [{"row": run.row.number, "name": run.row.name, "cause": run.cause} for run in failures],
         "table": table or None,
         "notes": list(notes),

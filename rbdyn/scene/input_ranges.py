@@ -113,7 +113,7 @@ def course_ranges(
 
     A time that one in twenty of the machines does not have has none.
     """
-    from rbdyn.thermal.start import STEADY
+    from rbdyn.thermal.start import STEADY, settled_times
 
     found = {}
     for name, column in figures.items():
@@ -122,9 +122,7 @@ def course_ranges(
         inside = np.minimum(low[0], low[-1]) - low.min(axis=0) > 1e-3 * np.ptp(low, axis=0)
         found[f"{name}_time_s"] = np.where(inside, rows.times[low.argmin(axis=0)], np.nan)
     found.pop(f"{DIFFERENCE}_time_s")
-    moving = np.abs(rows.temperatures - rows.temperatures[-1]).max(axis=-1) > STEADY
-    last = len(rows.times) - 1 - moving[::-1].argmax(axis=0)
-    found["time_to_steady_s"] = np.where(moving.any(axis=0), rows.times[np.minimum(last + 1, len(rows.times) - 1)], 0.0)
+    found["time_to_steady_s"] = settled_times(rows.times, rows.temperatures, STEADY)
     return {
         name: tuple(np.nanquantile(column, QUANTILES).tolist())
         for name, column in found.items()

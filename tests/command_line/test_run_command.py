@@ -165,11 +165,12 @@ def test_memory_holds_no_more_of_a_row_than_its_figures(folder, monkeypatch):
         frame = pd.DataFrame({"seed": range(1, count + 1)})
         if count > 2:  # the first call loads modules
             tracemalloc.start()
-        run_answer(frame, "base.toml", f"out{count}")
+        answer = run_answer(frame, "base.toml", f"out{count}")
         peaks.append(tracemalloc.get_traced_memory()[1])
         tracemalloc.stop()
     assert peaks[2] - peaks[1] < 120 * 4000
     written = json.loads(Path("out140/runs.json").read_text(encoding="utf-8"))
+    assert answer["rows"] == written["rows"] and answer.as_dict() == written
     assert [row["figures"]["figure_3"]["value"] for row in written["rows"]] == [float(n) for n in range(1, 141)]
 
 

@@ -8,7 +8,7 @@ import sys
 import numpy as np
 import pytest
 from conftest import ROOT
-from scipy.integrate import solve_ivp
+from warming_oracle import integrated, stated
 
 import rbdyn
 from rbdyn.base.faults import InputError
@@ -84,38 +84,8 @@ def test_unit_fixed_preload_grows_while_the_inner_ring_leads(cold):
 
 def test_oracle_course_of_balls_by_an_integration_of_its_own(cold):
     """Oracle: Radau on the heats, conductances and capacities of the JSON, put together anew, gives its temperatures within 1 %."""
-    start = cold.start
-    path, times = start.path, np.array(start.path["time_s"])
-    heat = np.array([path["heat_W"][node] for node in WARMING_NODES])
-    g = {name: np.array(column) for name, column in path["conductances_W_K"].items()}
-    capacity = np.array([start.capacities_J_K[node] for node in WARMING_NODES])
-    oil, outer, inner, balls, housing, shaft = range(6)
-    pairs = {
-        "oil_outer": (oil, outer), "oil_inner": (oil, inner), "oil_rollers": (oil, balls), "outer_rollers": (outer, balls),
-        "inner_rollers": (inner, balls), "outer_housing": (outer, housing), "inner_shaft": (inner, shaft),
-    }  # fmt: skip
-    around = start.boundaries_C["ambient"]
-    outside = {
-        "flow": (oil, start.boundaries_C["inlet"]), "sump": (oil, around), "housing_ambient": (housing, around),
-        "shaft_ambient": (shaft, around),
-    }  # fmt: skip
-    assert {*pairs, *outside} == set(g)
-
-    def rise(time, nodes):
-        net = np.array([np.interp(time, times, column) for column in heat])
-        for name, (one, other) in pairs.items():
-            flow = np.interp(time, times, g[name]) * (nodes[one] - nodes[other])
-            net[one] -= flow
-            net[other] += flow
-        for name, (node, temperature) in outside.items():
-            net[node] -= np.interp(time, times, g[name]) * (nodes[node] - temperature)
-        return net / capacity
-
-    found = solve_ivp(
-        rise, (0.0, times[-1]), np.full(6, 20.0), method="Radau", t_eval=times, rtol=1e-6, atol=1e-6, max_step=50.0
-    )
-    stated = np.array([path["temperatures_C"][node] for node in WARMING_NODES])
-    assert np.abs(found.y - stated).max() < 0.01 * (stated.max() - 20.0)
+    rows = stated(cold.start)
+    assert np.abs(integrated(cold.start) - rows).max() < 0.01 * (rows.max() - 20.0)
 
 
 def test_oracle_rows_are_equilibria_at_stated_temperatures(cold):

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
 from typer.testing import CliRunner
+from warming_oracle import integrated, stated
 
 from doe.clearance import responses_of
 from doe.study_file.study import Response
@@ -88,48 +88,12 @@ def test_unit_least_clearance_of_nu_308(cold):
 def test_oracle_course_by_an_integration_of_its_own(cold):
     """Oracle: Radau on the heats, conductances and capacities of the JSON, put together anew, gives its temperatures within 1 %."""
     start: StartResult = cold.start
-    path, times = start.path, np.array(start.path["time_s"])
-    heat = np.array([path["heat_W"][node] for node in WARMING_NODES])
-    g = {name: np.array(column) for name, column in path["conductances_W_K"].items()}
-    capacity = np.array([start.capacities_J_K[node] for node in WARMING_NODES])
-    inlet, ambient = start.boundaries_C["inlet"], start.boundaries_C["ambient"]
-    oil, outer, inner, rollers, housing, shaft = range(6)
-    pairs = {
-        "oil_outer": (oil, outer),
-        "oil_inner": (oil, inner),
-        "oil_rollers": (oil, rollers),
-        "outer_rollers": (outer, rollers),
-        "inner_rollers": (inner, rollers),
-        "outer_housing": (outer, housing),
-        "inner_shaft": (inner, shaft),
-    }
-    outside = {
-        "flow": (oil, inlet),
-        "sump": (oil, ambient),
-        "housing_ambient": (housing, ambient),
-        "shaft_ambient": (shaft, ambient),
-    }
-    assert {*pairs, *outside} == set(g)
-
-    def rise(time, nodes):
-        net = np.array([np.interp(time, times, column) for column in heat])
-        for name, (one, other) in pairs.items():
-            flow = np.interp(time, times, g[name]) * (nodes[one] - nodes[other])
-            net[one] -= flow
-            net[other] += flow
-        for name, (node, around) in outside.items():
-            net[node] -= np.interp(time, times, g[name]) * (nodes[node] - around)
-        return net / capacity
-
-    found = solve_ivp(
-        rise, (0.0, times[-1]), np.full(6, 20.0), method="Radau", t_eval=times, rtol=1e-7, atol=1e-7, max_step=20.0
-    )
-    stated = np.array([path["temperatures_C"][node] for node in WARMING_NODES])
-    assert np.abs(found.y - stated).max() < 0.01 * (stated.max() - 20.0)
+    path, rows = start.path, stated(start)
+    assert np.abs(integrated(start) - rows).max() < 0.01 * (rows.max() - 20.0)
     # Clearances of rows, by the scene at these temperatures.
     scene = _scene(start={})
     for row in (0, 40, 80, -1):
-        nodes = stated[:, row]
+        nodes = rows[:, row]
         hot = at_temperatures(scene, Temperatures(*nodes[:4].tolist()), tuple(nodes[4:].tolist()))
         for name, play in hot.clearances.items():
             assert path["figures"][f"{name}_um"][row] == pytest.approx(1e6 * play.operating, abs=1e-3)
