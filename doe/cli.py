@@ -11,7 +11,7 @@ with Loading():
 
 app = Program()
 
-for command in (new, status, design, fit, chain, uncertainty, calibrate, keys, run_table, study, front):
+for command in (new, study, status, design, fit, front, uncertainty, calibrate, chain, run_table, keys):
     app.command()(command)
 
 

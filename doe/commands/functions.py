@@ -44,37 +44,35 @@ if TYPE_CHECKING:
     from doe.running.runner import Progress
 
 
-StudyPath = Annotated[Path, typer.Argument(metavar="STUDY.toml", help="Study to run.")]
-Data = Annotated[Path | None, valued("TABLE.csv", "Table of runs made elsewhere.", "runs are simulated")]
+StudyPath = Annotated[Path, typer.Argument(metavar="STUDY.toml", help="Study file.")]
+Data = Annotated[Path | None, valued("TABLE.csv", "Use this table of runs instead of simulations.", "simulated runs")]
 Scheduler = Annotated[
-    str | None, valued("ADDRESS", "Run on the dask cluster of this scheduler.", "threads of this machine")
+    str | None, valued("ADDRESS", "Run on the dask cluster with this scheduler.", "threads of this machine")
 ]
-Retry = Annotated[bool, flag("--retry", says="Run points again that failed before.")]
+Retry = Annotated[bool, flag("--retry", says="Run failed points again.")]
 Part = Annotated[
-    str | None, valued("K/N", "Run only part K of N, for a queue; without it all parts are gathered.", "all runs")
+    str | None, valued("K/N", "Run only part K of N, for a queue; without it gather all parts.", "all runs")
 ]
 Adaptive = Annotated[
-    bool, flag("--adaptive", says="Also search the front in few runs, chosen by emulators; the pick is on it.")
+    bool, flag("--adaptive", says="Search the Pareto front with emulators (few extra runs) and select from it.")
 ]
 Robust = Annotated[
     bool,
     flag(
         "--robust",
-        says="Judge the pick over the unknown inputs of the scene; the table robust of a study asks for it too.",
+        says="Compute the probability that the selected design is better despite unknown inputs; automatic with the table robust.",
     ),
 ]
-Out = Annotated[Path | None, folder_option("Folder of results and of the store of finished runs.")]
-StudyOut = Annotated[
-    Path | None, folder_option("Folder of results and of the store of finished runs.", "STUDY_results")
-]
-Save = Annotated[Path | None, folder_option("Also write the JSON record here.")]
-Quiet = Annotated[bool, flag("--quiet", "-q", says="No progress, only the answer.")]
+STORE = "Folder of results and of the store of finished runs."
+Out = Annotated[Path | None, folder_option(STORE)]
+Save = Annotated[Path | None, folder_option("Write the JSON record to this folder.")]
+Quiet = Annotated[bool, flag("--quiet", "-q", says="Print only the answer, without progress.")]
 Verbose = Annotated[
     bool,
     flag(
         "--verbose",
         "-v",
-        says="Also every confirmed point, chains, the published table, the analysis of variance, all notes in full.",
+        says="Add every confirmed point, chains, the published table, the analysis of variance, all notes in full.",
     ),
 ]
 
@@ -157,18 +155,17 @@ def _hand_over(answer: "Answer", as_json: bool, detail: Detail) -> None:
         raise typer.Exit(FAILED)
 
 
-ScenePath = Annotated[Path, typer.Argument(metavar="SCENE.toml", help="Scene of a roller bearing.")]
-STORE = "Folder of results and of the store of finished runs."
+ScenePath = Annotated[Path, typer.Argument(metavar="SCENE.toml", help="Scene file of a roller bearing.")]
 Texts = list[str] | None
 # How runs are made, of every command that simulates.
 RUNS = {"workers": Workers, "scheduler": Scheduler, "retry": Retry}
 
 study = command(
     "study",
-    "Design, simulate, fit, optimise, confirm and dimension in one go; resumes by itself.",
+    "Run a complete study: design, simulate, fit, optimise, confirm and dimension. Resumes after an interruption.",
     "results",
     path=StudyPath,
-    out=StudyOut,
+    out=Annotated[Path | None, folder_option(STORE, "STUDY_results")],
     part=Part,
     **RUNS,
     adaptive=Adaptive,
@@ -178,14 +175,13 @@ study = command(
 )
 run = command(
     "run",
-    "Simulate every row of a table of scenes; a failed row does not end the others. Resumes by itself.",
+    "Simulate every row of a table of scenes, even if some fail. Resumes after an interruption.",
     "results",
     "run_answer",
     table=Annotated[
-        Path,
-        typer.Argument(metavar="TABLE", help="CSV, xlsx or parquet: one row per run, columns are keys of a scene."),
+        Path, typer.Argument(metavar="TABLE", help="CSV, xlsx or parquet: one row per run, one column per scene key.")
     ],
-    scene=Annotated[Path | None, valued("SCENE.toml", "Scene of rows without one.", "the column scene", "--scene")],
+    scene=Annotated[Path | None, valued("SCENE.toml", "Scene file of rows without one.", "column scene", "--scene")],
     part=Part,
     overrides=Set,
     out=Annotated[Path | None, folder_option(STORE, "TABLE_results")],
@@ -194,17 +190,17 @@ run = command(
 )
 design = command(
     "design",
-    "Print the design: every run, and how well the runs identify the terms of the models.",
+    "Print the design: every run, and how well the runs identify the terms of each model.",
     path=StudyPath,
     out=Save,
-    as_csv=Annotated[bool, flag("--csv", says="Print a CSV table and nothing else.")],
-    quiet=Annotated[bool, flag("--quiet", "-q", says="Actual values only.")],
-    verbose=Annotated[bool, verbose_flag("Also seeds and leverages.")],
+    as_csv=Annotated[bool, flag("--csv", says="Print only one CSV table.")],
+    quiet=Annotated[bool, flag("--quiet", "-q", says="Print only actual values.")],
+    verbose=Annotated[bool, verbose_flag("Add seeds and leverages.")],
 )
 fit = command(
     "fit",
     "Fit the response surfaces and print their analysis of variance.",
-    path=Annotated[Path | None, typer.Argument(metavar="STUDY.toml", help="Study to fit; none for a table alone.")],
+    path=Annotated[Path | None, typer.Argument(metavar="STUDY.toml", help="Study file; none for a table alone.")],
     data=Data,
     factors=Annotated[
         Texts,
@@ -231,7 +227,7 @@ fit = command(
     out=Out,
     **RUNS,
     quiet=Quiet,
-    verbose=Annotated[bool, verbose_flag("Also residual, leverage and Cook's distance of each run.")],
+    verbose=Annotated[bool, verbose_flag("Add residual, leverage and Cook's distance of each run.")],
 )
 front = command(
     "front",
@@ -244,37 +240,37 @@ front = command(
         str | None,
         valued(
             "A,B,...|NAME=A,...",
-            "Also predict this point on the surfaces: factor values in order, or by name (the rest at the baseline).",
+            "Predict the responses at this point: factor values in order, or by name (the rest at the baseline).",
             "none",
         ),
     ],
     quiet=Quiet,
-    verbose=Annotated[bool, verbose_flag("Also every point of the front.")],
+    verbose=Annotated[bool, verbose_flag("Add every point of the front.")],
 )
 chain = command(
     "chain",
-    "Solve dimension chains: limits, yield, contributions, allocation. A chain that misses its limits ends with exit code 1.",
+    "Solve dimension chains: limits, yield, contributions, allocation. Exits with code 1 if a chain misses its limits.",
     path=Annotated[
         Path, typer.Argument(metavar="CHAIN.toml", help="Dimension chain to solve, or several in tables named chain.")
     ],
     out=Save,
-    quiet=Annotated[bool, flag("--quiet", "-q", says="Parts only.")],
-    verbose=Annotated[bool, verbose_flag("Also yields by distribution, quantiles, classes.")],
+    quiet=Annotated[bool, flag("--quiet", "-q", says="Print only the parts.")],
+    verbose=Annotated[bool, verbose_flag("Add yields by distribution, quantiles, classes.")],
 )
 uncertainty = command(
     "uncertainty",
-    "List the unknown inputs of a scene, the range of every output over them, and the share of each input.",
+    "Vary the unknown inputs: range of each result, and how much each input contributes.",
     "uncertainty",
     path=ScenePath,
     points=Annotated[int | None, valued("N", "Input sets to begin with, a power of two.", "128", min=16, max=512)],
     target=Annotated[
-        str | None, valued("SHARE", "Standard error of the ends of a range, as a share of its width.", "10%")
+        str | None, valued("SHARE", "Allowed standard error of the ends of a range, as a share of its width.", "10%")
     ],
     figures=Annotated[
         Texts,
         valued(
             "NAME",
-            "A further output, such as land_film_power_W or outer_max_pressure_MPa; repeatable.",
+            "Add a result, such as land_film_power_W or outer_max_pressure_MPa; repeatable.",
             "impact, whirl, loss, cage speed, temperatures",
             "--figure",
         ),
@@ -286,14 +282,14 @@ uncertainty = command(
 )
 calibrate = command(
     "calibrate",
-    "Identify the unknown inputs of a scene from measurements on a rig, and state whether it may be called calibrated.",
+    "Estimate unknown inputs from test-rig measurements, and check whether the model is calibrated.",
     "calibration",
     path=ScenePath,
     data=Annotated[
         Path,
-        typer.Option(metavar="RIG.csv", help="Measurements, a row for each condition: scene keys, outputs, their _sd."),
+        typer.Option(metavar="RIG.csv", help="Measurements, one row per condition: scene keys, results, their _sd."),
     ],
-    free=Annotated[Texts, valued("KEY", "Key to identify; repeatable.", "all unknown inputs", "--free")],
+    free=Annotated[Texts, valued("KEY", "Estimate this key; repeatable.", "all unknown inputs", "--free")],
     overrides=Set,
     out=Annotated[Path | None, folder_option(STORE, "SCENE_calibration")],
     **RUNS,
@@ -326,18 +322,18 @@ def kinds() -> "dict[str, type[BaseModel]]":
 
 def status(
     path: Annotated[
-        Path, typer.Argument(metavar="FILE.toml", help="Study, or scene of an uncertainty or calibration.")
+        Path, typer.Argument(metavar="FILE.toml", help="Study, or scene of an uncertainty analysis or calibration.")
     ],
     out: Annotated[
         Path | None,
         folder_option(
-            "Folder of the runs.", "where it runs; if it does not, STUDY_results, SCENE_uncertainty or _calibration"
+            "Folder of the runs.", "where it runs, otherwise STUDY_results, SCENE_uncertainty or _calibration"
         ),
     ] = None,
     as_json: Json = False,
     quiet: Quiet = False,
 ) -> None:
-    """Show where a study stands: its stage, runs done, failed by cause, running and to come."""
+    """Show the progress of a study: stage, finished and failed runs (with cause), running and missing runs, time."""
     with guarded(as_json):
         from doe.workflow.status import status_of
 

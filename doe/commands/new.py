@@ -74,26 +74,26 @@ class Factor(NamedTuple):
 
 
 def new(
-    path: Annotated[Path, typer.Argument(metavar="SCENE.toml", help="Scene whose clearances are to be studied.")],
+    path: Annotated[Path, typer.Argument(metavar="SCENE.toml", help="Scene file whose clearances to study.")],
     limit: Annotated[
         list[str] | None,
         valued(
             "NAME<=V",
-            'Limit of a response, in quotes: "power_loss_W<=250", >= or = for <=; repeatable.',
+            'Limit a response, in quotes: "power_loss_W<=250", >= or = for <=; repeatable.',
             "none",
             "--limit",
         ),
     ] = None,
     tolerances: Annotated[
-        bool, flag("--tolerances", says="Tolerances of the clearances by grades of ISO 286, and the widest ones.")
+        bool, flag("--tolerances", says="Add tolerances of the clearances by ISO 286 grade, and the widest ones.")
     ] = False,
-    chains: Annotated[bool, flag("--chains", says="Dimension chains of the parts that make the clearances.")] = False,
+    chains: Annotated[bool, flag("--chains", says="Add the dimension chains of the parts.")] = False,
     duty: Annotated[
         Path | None,
         valued(
             "FILE",
-            "Points of operation: CSV with name, share or hours, and keys; or TOML.",
-            "the scene's own",
+            "Operating points of a duty cycle: CSV with name, share or hours, and keys; or TOML.",
+            "the scene file's own",
             "--duty",
         ),
     ] = None,
@@ -101,7 +101,7 @@ def new(
     force: ForceFile = False,
     as_json: Json = False,
 ) -> None:
-    """Write a commented study of a scene's clearances."""
+    """Create a commented study file for the clearances of a scene file."""
     with guarded(as_json):
         from doe.study_file.study import StudyFile
         from doe.workflow.effort import Effort

@@ -287,8 +287,10 @@ def valued(metavar: str, says: str, default: str | bool, *names: str, **more: An
 
 
 def _without_types(params: list[Any]) -> list[Any]:
-    """The parameters of a command; help shows no type for an option without a value."""
+    """The parameters of a command; help shows no type for an option without a value, and no brackets around a default in words."""
     for param in params:
+        if isinstance(getattr(param, "show_default", None), str):
+            param._get_default_string = lambda default=param.show_default, **_: default
         if getattr(param, "is_flag", False) and param.metavar is None:
             param.metavar = ""
     return params
@@ -325,7 +327,7 @@ class Program(typer.Typer):
         return super().command(name, cls=cls, **options)
 
 
-def folder_option(says: str, default: str = "nothing is written") -> Any:
+def folder_option(says: str, default: str | bool = "none") -> Any:
     """``--out`` of a command that writes a folder."""
     return valued("DIR", says, default, "--out")
 
@@ -344,19 +346,19 @@ def _print_version(requested: bool) -> None:
 
 
 Version = Annotated[bool, flag("--version", says="Print the version.", callback=_print_version, is_eager=True)]
-SceneFile = Annotated[Path, typer.Argument(metavar="SCENE.toml", help="Scene to simulate.")]
+SceneFile = Annotated[Path, typer.Argument(metavar="SCENE.toml", help="Scene file: bearing and operating point.")]
 Set = Annotated[
-    list[str] | None, valued("KEY.PATH=VALUE", "Replace a key; repeatable.", "the scene as written", "--set")
+    list[str] | None, valued("KEY.PATH=VALUE", "Replace a key of the scene file; repeatable.", "none", "--set")
 ]
 Turns = Annotated[float | None, valued("N", "Counted shaft turns.", "numerics.turns of the scene")]
 Replicates = Annotated[int | None, valued("N", "Seeded replicates.", "numerics.replicates of the scene")]
-Seed = Annotated[int | None, valued("N", "Seed of all random starts and spreads.", "numerics.seed of the scene")]
-Workers = Annotated[int | None, valued("N", "Threads.", "all processors", min=1)]
-Force = Annotated[bool, flag("--force", says="Write over files in the folder that this command did not make.")]
-OutFile = Annotated[Path | None, valued("FILE", "Write it to this file.", "standard output", "--out")]
-ForceFile = Annotated[bool, flag("--force", says="Write over the file of --out.")]
-Json = Annotated[bool, flag("--json", says="Print one JSON object and nothing else.")]
-Quiet = Annotated[bool, flag("--quiet", "-q", says="No progress, no notes but dangers.")]
+Seed = Annotated[int | None, valued("N", "Seed of all random starts and deviations.", "numerics.seed of the scene")]
+Workers = Annotated[int | None, valued("N", "Number of threads.", "all processors", min=1)]
+Force = Annotated[bool, flag("--force", says="Overwrite files in the folder that this command did not write.")]
+OutFile = Annotated[Path | None, valued("FILE", "Write to this file.", "standard output", "--out")]
+ForceFile = Annotated[bool, flag("--force", says="Overwrite the file of --out.")]
+Json = Annotated[bool, flag("--json", says="Print only one JSON object.")]
+Quiet = Annotated[bool, flag("--quiet", "-q", says="Print no progress, and only notes of danger.")]
 
 
 # Column in which the comment on a key starts.

@@ -56,24 +56,17 @@ SHOW_FILES = (
 
 app = command.Program()
 
-app.command()(ball)
-app.command()(compare)
-app.command("keys")(describe_keys)
-app.command()(new)
-app.command()(manual)
-
 
 @app.callback()
 def main(version: command.Version = False) -> None:
     """Dynamics of rolling bearings: forces, whirl and power loss with their errors."""
 
 
-@app.command()
 @result_command(
     "rbdyn simulate",
     (*SIMULATION_FILES, *DUTY_FILES, *REPORT_FILES),
-    "Write result.json, history.csv and pictures here.",
-    "Also print power terms and cost.",
+    "Write result.json, history.csv and pictures to this folder.",
+    "Add power terms and cost.",
 )
 def simulate(
     console: Console,
@@ -87,18 +80,18 @@ def simulate(
         str | None,
         command.valued(
             "2%",
-            "Choose tolerance, turns and replicates so that the errors of impact, whirl and loss are at most this.",
-            "those given",
+            "Choose tolerance, turns and replicates for this relative error of impact force, whirl ratio and power loss.",
+            "as given",
         ),
     ] = None,
     duty: Annotated[
         Path | None,
         command.valued(
-            "FILE", "Each point of a duty: CSV with name, share or hours, and keys; or TOML.", "one point", "--duty"
+            "FILE", "Simulate a duty cycle: CSV with name, share or hours, and keys; or TOML.", "one point", "--duty"
         ),
     ] = None,
 ) -> Delivery:
-    """Simulate a cylindrical roller bearing: impact force, whirl deviation ratio, power loss; at one point or over a duty."""
+    """Simulate a cylindrical roller bearing at one point or over a duty cycle: impact force, whirl deviation ratio, power loss."""
     loaded = _rollers(scene, assignments, turns=turns, replicates=replicates, seed=seed)
     aim = None if target is None else _aim(target, turns, replicates)
     if duty is not None:
@@ -145,23 +138,21 @@ def _over_duty(
     return Delivery(identity, found.as_dict, answer, write, bool(found.failed))
 
 
-@app.command()
-@result_command("rbdyn accuracy", ACCURACY_FILES, "Write the study as JSON, CSV and pictures here.", "Also versions.")
+@result_command("rbdyn accuracy", ACCURACY_FILES, "Write JSON, CSV and pictures to this folder.", "Add versions.")
 def accuracy(
     console: Console,
-    scene: Annotated[Path, typer.Argument(metavar="SCENE.toml", help="Scene to study.")],
+    scene: Annotated[Path, typer.Argument(metavar="SCENE.toml", help="Scene file to examine.")],
     study: Annotated[
         str | None,
         typer.Argument(
             metavar="[tolerances|methods|coverage|options|stability]",
-            help="Error by tolerance; other integrators, or the solver of a ball bearing; how often the stated intervals contain "
-            "the true value; what each option costs; how extreme variants of the scene end.",
+            help="Error by tolerance; other integrators (or ball solver); coverage of intervals; cost of options; extreme variants.",
             show_default="tolerances; methods of a ball bearing",
         ),
     ] = None,
     assignments: command.Set = None,
 ) -> Delivery:
-    """Show error against run time: of every output at each tolerance and of the motion; of a ball bearing, its solver."""
+    """Compare error and run time for different tolerances and integrators; for a ball bearing, measure the solver."""
     from rbdyn import accuracy as studies
 
     loaded = Scene.load(scene, assignments or [])
@@ -209,38 +200,37 @@ def _map_record(mapped: "SlipMap", duty: "MapDuty | None") -> dict[str, Any]:
     return mapped.as_dict() | ({} if duty is None else {"duty": duty.as_dict()})
 
 
-@app.command("map")
 @result_command(
     "rbdyn map",
     (*MAP_FILES, *STIFFNESS_FILES, *REPORT_FILES),
-    "Write map.json, map.csv and map.png here, and keep finished points; with --stiffness stiffness.csv and the like.",
+    "Write tables and a picture to this folder, and keep finished points there.",
     keeps=(MAP_POINTS,),
 )
 def slip_map(
     console: Console,
     scene: command.SceneFile,
-    speed: Annotated[str | None, command.valued("RPM", "Inner speeds: start:stop:count or a,b,c.", "one")] = None,
-    load: Annotated[str | None, command.valued("N", "Radial loads, written alike.", "one")] = None,
+    speed: Annotated[str | None, command.valued("RPM", "Inner-ring speeds: start:stop:count or a,b,c.", "one")] = None,
+    load: Annotated[str | None, command.valued("N", "Radial loads: start:stop:count or a,b,c.", "one")] = None,
     sweep: Annotated[
         list[str] | None,
         command.valued(
-            "KEY=VALUES", "Any other key, instead of speed or load; repeatable.", "speed and load", "--sweep"
+            "KEY=VALUES", "Vary any other key instead of speed or load; repeatable.", "speed and load", "--sweep"
         ),
     ] = None,
     duty: Annotated[
         Path | None,
-        command.valued("FILE", "Mark its points of operation: TOML such as a study, or CSV.", "no marks", "--duty"),
+        command.valued("FILE", "Mark the operating points of this file, such as a study's.", "none", "--duty"),
     ] = None,
     stiffness: Annotated[
         bool,
         command.flag(
             "--stiffness",
-            says="Instead of that, the stiffness for a program of rotors such as ROSS; also of ball bearings.",
+            says="Map the stiffness of a roller or ball bearing, for rotor dynamics programs such as ROSS.",
         ),
     ] = False,
     load_angle: Annotated[
         float,
-        command.valued("DEG", "Direction of the load from x of the stiffness; -90 where gravity pulls along -y.", "0"),
+        command.valued("DEG", "Load direction from the x axis of the stiffness; -90 if gravity acts along -y.", "0"),
     ] = 0.0,
     loss_factor: Annotated[
         float, command.valued("ETA", "Damping of the stiffness, c = ETA k/speed.", "0, no damping")
@@ -251,7 +241,7 @@ def slip_map(
     seed: command.Seed = None,
     workers: command.Workers = None,
 ) -> Delivery:
-    """Map cage slip, power loss, impact, whirl and class of the cage over two keys, or the stiffness over speed and load."""
+    """Map cage slip, power loss, impact, whirl and cage class over two keys, or stiffness over speed and load."""
     swept = _map_axes(speed, load, sweep or [])
     (along, columns), (up, rows) = swept.items()
     if (along, up) != AXES and (stiffness or duty):
@@ -341,19 +331,18 @@ def _aim(target: str, turns: float | None, replicates: int | None) -> float:
     return target_of(target)
 
 
-@app.command()
 def show(
-    result: Annotated[Path, typer.Argument(metavar="RESULT", help="A result.json, or a folder that holds one.")],
-    out: Annotated[Path | None, command.folder_option("Write here.", "'show' next to the result")] = None,
+    result: Annotated[Path, typer.Argument(metavar="RESULT", help="A result.json, or a folder with one.")],
+    out: Annotated[Path | None, command.folder_option("Write to this folder.", "show, next to the result")] = None,
     force: command.Force = False,
     turns: Annotated[float | None, command.valued("N", "Counted shaft turns to show.", "all, at most 20")] = None,
-    replicate: Annotated[int, typer.Option(metavar="N", help="Which replicate, from 1.")] = 1,
-    animate: Annotated[bool, command.flag("--animate", says="Also a moving picture and a player.")] = False,
+    replicate: Annotated[int, typer.Option(metavar="N", help="Number of the replicate, from 1.")] = 1,
+    animate: Annotated[bool, command.flag("--animate", says="Add a film and a page that plays the motion.")] = False,
     as_json: command.Json = False,
     quiet: command.Quiet = False,
-    verbose: Annotated[bool, command.verbose_flag("Also peaks of the spectra.")] = False,
+    verbose: Annotated[bool, command.verbose_flag("Add peaks of the spectra.")] = False,
 ) -> None:
-    """Show how the bearing of a saved result moves: pictures, history.csv and orbit.json."""
+    """Write pictures and time histories of a saved simulation."""
     target = out or (result if result.is_dir() else result.parent) / "show"
     with command.guarded(as_json), output_folder(target, "rbdyn show", SHOW_FILES, force=force) as folder:
         from rbdyn.cli import show as motion_output
@@ -370,3 +359,8 @@ def show(
             target,
             record["files"],
         )
+
+
+COMMANDS = {"new": new, "simulate": simulate, "show": show, "map": slip_map, "ball": ball, "compare": compare}
+for name, function in {**COMMANDS, "accuracy": accuracy, "keys": describe_keys, "manual": manual}.items():
+    app.command(name)(function)

@@ -26,19 +26,19 @@ PICTURES = (
 )  # fmt: skip
 FILES = (*EQUILIBRIUM_FILES, *SWEEP_FILES, *STUDY_FILES, *PICTURES, *REPORT_FILES)
 
-VALUES, UNASKED = "start:stop:count or a,b,c", "the equilibrium alone"
+VALUES = "start:stop:count or a,b,c"
 
 
 def study_option(metavar: str, says: str) -> Any:
     """An option that asks for a study instead of the equilibrium."""
-    return valued(metavar, f"{says}, instead.", UNASKED)
+    return valued(metavar, says, "equilibrium only")
 
 
 @result_command(
     "rbdyn ball",
     FILES,
-    "Write the result as JSON here, with its tables and pictures.",
-    "Also the stiffness matrix and cost.",
+    "Write JSON, tables and pictures to this folder.",
+    "Add the stiffness matrix and cost.",
     ("sweep.part",),
 )
 def ball(
@@ -47,23 +47,22 @@ def ball(
     assignments: Set = None,
     sweeps: Annotated[
         list[str] | None,
-        valued("KEY=VALUES", f"Sweep a number of the scene, {VALUES}; repeatable for a grid.", "one point", "--sweep"),
+        valued("KEY=VALUES", f"Vary a number of the scene, {VALUES}; repeatable for a grid.", "one point", "--sweep"),
     ] = None,
-    preload: Annotated[str | None, study_option("N", f"Stress and life over axial preload, {VALUES}")] = None,
-    clearance: Annotated[str | None, study_option("UM", "The same over the diametral clearance")] = None,
-    wear: Annotated[str | None, study_option("UM", "The same over the diameter that balls lose")] = None,
+    preload: Annotated[str | None, study_option("N", f"Stress and life over axial preload, {VALUES}.")] = None,
+    clearance: Annotated[str | None, study_option("UM", f"Stress and life over diametral clearance, {VALUES}.")] = None,
+    wear: Annotated[str | None, study_option("UM", f"Stress and life over ball wear (diameter), {VALUES}.")] = None,
     race_limits: Annotated[
-        str | None, study_option("CLASS", "Race errors with which bearings meet P2, P4 or P5")
+        str | None, study_option("CLASS", "Raceway errors with which bearings meet class P2, P4 or P5.")
     ] = None,
     target_yield: Annotated[
         float | None, valued("SHARE", "Share of bearings that must meet --race-limits.", "0.95", "--yield")
     ] = None,
     seed: Annotated[
-        int | None,
-        valued("N", "Seed of form errors, or of the lot of --race-limits.", "errors.seed; of the lot 1", min=0),
+        int | None, valued("N", "Seed of form errors, or of --race-limits.", "errors.seed; 1 for --race-limits", min=0)
     ] = None,
 ) -> Delivery:
-    """Find the equilibrium of a ball bearing: contact angles, loads, stiffness, stress, life."""
+    """Calculate the equilibrium of a ball bearing: contact angles, loads, stiffness, stress, life."""
     loaded = balls_only(Scene.load(scene, assignments or []))
     if seed is not None and race_limits is None:
         loaded = _seeded(loaded, seed)

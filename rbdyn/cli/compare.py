@@ -26,22 +26,19 @@ ABSOLUTE = ("°C", "µm", "mrad", "deg")
 @result_command(
     "rbdyn compare",
     (*FILES, *REPORT_FILES),
-    "Write comparison.json, inputs.csv and differences.csv here.",
-    "Also losses, clearances and contacts one by one.",
+    "Write comparison.json, inputs.csv and differences.csv to this folder.",
+    "Add losses, clearances and contacts one by one.",
 )
 def compare(
     console: Console,
-    a: Annotated[Path, typer.Argument(metavar="A", help="A scene, a saved result, or a folder that holds one.")],
+    a: Annotated[Path, typer.Argument(metavar="A", help="A scene file, a saved result, or a folder with one.")],
     b: Annotated[
-        Path | None, typer.Argument(metavar="B", help="Another of the same kind.", show_default="A with --set")
+        Path | None, typer.Argument(metavar="B", help="A second bearing of this kind.", show_default="A with --set")
     ] = None,
     assignments: Annotated[
         list[str] | None,
         command.valued(
-            "KEY.PATH=VALUE",
-            "Replace a key of B; without B it is A with these keys; repeatable.",
-            "B as written",
-            "--set",
+            "KEY.PATH=VALUE", "Replace a key of B (without B: of a copy of A); repeatable.", "B as written", "--set"
         ),
     ] = None,
     turns: command.Turns = None,
@@ -49,7 +46,7 @@ def compare(
     seed: command.Seed = None,
     workers: command.Workers = None,
 ) -> Delivery:
-    """Compare two bearings: inputs that differ, figures, and which of the differences are significant."""
+    """Compare two bearings: inputs that differ, results, and which differences are significant."""
     console.folder.claim(a, *([] if b is None else [b]))
     from rbdyn.comparison import compare as run
     from rbdyn.comparison import file_of

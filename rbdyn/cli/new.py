@@ -17,12 +17,12 @@ Designations = Annotated[
     list[str],
     typer.Argument(
         metavar="DESIGNATION|own|FILE.rexs",
-        help="Bearing: NU210, NU 1010 M, 6208 C3, 7208B; own: your drawing; or a bearing of a REXS file.",
+        help="Designation (NU210, NU 1010 M, 6208 C3, 7208B), own for your drawing, or a REXS file.",
     ),
 ]
 
 BearingOfFile = Annotated[
-    str | None, valued("ID", "Bearing of a REXS file, by its number or name.", "the only one", "--bearing")
+    str | None, valued("ID", "Number or name of a bearing in the REXS file.", "the only one", "--bearing")
 ]
 
 
@@ -34,7 +34,7 @@ def new(
     as_json: Json = False,
     **texts: str | None,
 ) -> None:
-    """Write a commented scene of a catalogue bearing, of a REXS file, or of one's own, its interior estimated."""
+    """Create a commented scene file for a catalogue bearing, a REXS file or your own drawing. Missing dimensions are estimated."""
     with guarded(as_json):
         words, typed = " ".join(designation), {dashed(name): text for name, text in texts.items()}
         if is_rexs(words):

@@ -21,7 +21,7 @@ ROLLER = re.compile(r"\s*([\d.]+)\s*[xX\u00d7*]\s*([\d.]+)\s*(?:mm)?\s*")
 POLYAMIDE_NAME = "polyamide"
 TEMPERATURE_C, OIL = 70.0, "ISO VG 68"
 SLOWEST_RPM = 0.1
-LISTED, OF_OWN = "as listed; of own: estimated", "only with own"
+LISTED, OF_OWN = "as listed; estimated for own", "only with own"
 # Options that write [thermal], and those of one kind of bearing, whatever names it.
 HEAT = "--oil-flow", "--oil-inlet", "--ambient"
 OF_ROLLERS, OF_BALLS = ("--guidance", "--cage-material", "--lubrication"), ("--preload",)
@@ -152,33 +152,33 @@ class Options:
         "RPM", "Speed of the inner ring.", "half the reference speed", number(-1e6, 1e6, "rpm"), "operation.inner_speed_rpm")
     load: float | None = option("N", "Radial load.", "0.1 C", number(0.0, 1e7, "N"), "operation.radial_load_N")
     preload: float | None = option(
-        "N", "Axial preload of a ball bearing.", "what loads half of the balls", number(-1e8, 1e8, "N"), "operation.preload_N")
+        "N", "Axial preload of a ball bearing.", "loads half of the balls", number(-1e8, 1e8, "N"), "operation.preload_N")
     oil: NamedOil = option(  # noqa: RUF009
-        "NAME", '"ISO VG 32 PAO", "grease VG 100", 23699, "Jet Oil II".', True, oil_named, preset=OIL)
+        "NAME", 'Lubricant: "ISO VG 32 PAO", "grease VG 100", 23699 or "Jet Oil II".', True, oil_named, preset=OIL)
     temperature: float | None = option(
-        "C", "Temperature of the oil.", f"{TEMPERATURE_C:g}, or by the heat balance of --ambient", CELSIUS, "lubricant.temperature_C")
+        "C", "Oil temperature.", f"{TEMPERATURE_C:g}, or by the heat balance of --ambient", CELSIUS, "lubricant.temperature_C")
     oil_flow: float | None = option(
         "L_MIN", "Oil flow in L/min; a heat balance computes the temperatures.", "no flow", number(1e-4, 1e3, "L/min"),
         "lubricant.oil_flow_l_min")
     oil_inlet: float | None = option(
-        "C", "Temperature of the oil that flows in.", "no flow", CELSIUS, "lubricant.oil_inlet_temperature_C")
+        "C", "Oil inlet temperature.", "no flow", CELSIUS, "lubricant.oil_inlet_temperature_C")
     ambient: float | None = option(
-        "C", "Temperature around housing and shaft; writes the heat balance.", "20 with --oil-flow", CELSIUS, "thermal.ambient_C")
+        "C", "Ambient temperature of housing and shaft; writes the heat balance.", "20 with --oil-flow", CELSIUS, "thermal.ambient_C")
     clearance: str | float | None = option(
-        "CLASS|MM", "C2, CN, C3, C4 or C5, or diametral in mm.", "of DESIGNATION, else CN", clearance_of, "bearing.radial_clearance_mm")
+        "CLASS|MM", "Clearance class C2, CN, C3, C4 or C5, or diametral clearance in mm.", "of DESIGNATION, otherwise CN", clearance_of, "bearing.radial_clearance_mm")
     lubrication: str | None = option(
-        "HOW", "bath, drop, jet, oil_air or grease.", "bath; grease if --oil is one, jet with --oil-flow", supply_of)
+        "HOW", "Lubrication method: bath, drop, jet, oil_air or grease.", "bath; grease if --oil is one, jet with --oil-flow", supply_of)
     guidance: str | None = option(
-        "PART", "What guides the cage: outer, inner or roller.", "of DESIGNATION, else outer", guidance_of)
+        "PART", "Part that guides the cage: outer, inner or roller.", "of DESIGNATION, otherwise outer", guidance_of)
     cage_material: str | None = option(
-        "NAME", "Material of the cage: brass, peek, polyamide.", "of DESIGNATION, else brass", cage_material_of)
-    bore: float | None = option("MM", "Bore, where the table lacks the bearing.", LISTED, MILLIMETRES(1.0, 2000.0))
+        "NAME", "Material of the cage: brass, peek, polyamide.", "of DESIGNATION, otherwise brass", cage_material_of)
+    bore: float | None = option("MM", "Bore, if the bearing is not in the table.", LISTED, MILLIMETRES(1.0, 2000.0))
     outside: float | None = option("MM", "Outside diameter.", LISTED, MILLIMETRES(2.0, 4000.0))
     width: float | None = option("MM", "Width.", LISTED, MILLIMETRES(0.5, 1000.0))
     shaft: str | None = option(
-        "CLASS", "Tolerance class of the shaft: k5. Writes the table mounting.", "loose", str, "mounting.inner_interference_um")
+        "CLASS", "Tolerance class of the shaft, such as k5. Writes the table mounting.", "not mounted", str, "mounting.inner_interference_um")
     housing: str | None = option(
-        "CLASS", "Tolerance class of the housing: H7. Writes the table mounting.", "loose", str, "mounting.outer_interference_um")
+        "CLASS", "Tolerance class of the housing, such as H7. Writes the table mounting.", "not mounted", str, "mounting.outer_interference_um")
     # fmt: on
     faults: list[str] = field(default_factory=list)
 

@@ -48,11 +48,42 @@ def test_chains_in_one_file_are_named_in_the_help(monkeypatch, width):
     assert "or several in tables named chain." in printed and "[]" not in printed
 
 
+# Commands in the order in which a user needs them, and the verbs that they begin with.
+ORDER = {
+    "rbdyn": "new simulate show map ball compare accuracy keys manual",
+    "doe": "new study status design fit front uncertainty calibrate chain run keys",
+}
+VERBS = "Calculate|Compare|Create|Estimate|Explain|Find|Fit|Map|Print|Run|Show|Simulate|Solve|Vary|Write"
+LONGEST_HELP = 20
+
+
+@pytest.mark.parametrize("name", APPS)
+def test_help_is_short_and_says_what_to_do(name):
+    """Command line: commands come in the order of their use and begin with a verb; no help has more than 20 words or leans on another."""
+    commands = typer.main.get_command(APPS[name]).commands
+    assert " ".join(commands) == ORDER[name]
+    for command, known in commands.items():
+        assert re.match(rf"(?:{VERBS})\b", known.help), command
+        for text in (known.help, *(option.help for option in known.params)):
+            assert len(re.findall(r"\S*[A-Za-z]\S*", text)) <= LONGEST_HELP, f"{name} {command}: {text}"
+            assert not re.search(r"instead\.|one's own|\b(?:the same|also)\b", text, re.IGNORECASE), (
+                f"{name} {command}: {text}"
+            )
+
+
+def test_flags_show_no_value():
+    """Command line: an option without a value is listed without the type of one."""
+    printed = (
+        CliRunner().invoke(rbdyn_app, ["simulate", "--help"]).output + CliRunner().invoke(doe_app, ["--help"]).output
+    )
+    assert "--install-completion" in printed and "bool" not in printed
+
+
 def test_defaults_stand_in_the_help_as_printed(monkeypatch):
     monkeypatch.setenv("COLUMNS", "200")
     printed = CliRunner().invoke(rbdyn_app, ["simulate", "--help"]).output
-    assert "[default: (numerics.turns of the scene)]" in printed and "[default: (all processors)]" in printed
-    assert "[default: (STUDY_results)]" in CliRunner().invoke(doe_app, ["study", "--help"]).output
+    assert "[default: numerics.turns of the scene]" in printed and "[default: all processors]" in printed
+    assert "[default: STUDY_results]" in CliRunner().invoke(doe_app, ["study", "--help"]).output
 
 
 @pytest.mark.parametrize(

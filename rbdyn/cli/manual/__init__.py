@@ -25,11 +25,11 @@ PAGE = "manual.html"
 
 def manual(
     context: typer.Context,
-    out: Annotated[Path, folder_option("Write manual.html here.")] = Path("manual"),
+    out: Annotated[Path, folder_option("Write manual.html to this folder.", True)] = Path("manual"),
     force: Force = False,
     as_json: Json = False,
 ) -> None:
-    """Write the manual as one page that opens from disk: own bearing, keys, commands, equations, what is left out."""
+    """Write the manual as one HTML file that works offline."""
     with guarded(as_json), output_folder(out, "rbdyn manual", (PAGE,), force=force) as folder:
         from importlib.metadata import entry_points
 
@@ -45,7 +45,7 @@ def manual(
 
 
 def describe_keys(word: Word = None, as_schema: AsSchema = False, as_json: Json = False) -> None:
-    """Explain every key of a scene: its meaning, its unit, range and default."""
+    """Explain every key of a scene file: meaning, unit, range and default."""
     with guarded(as_json):
         run(kinds(), word, as_schema, as_json)
 
