@@ -267,7 +267,7 @@ def attempt(scene: Scene, stop: "Stop | None" = None, workers: int = 1) -> RunOu
     start_s = time.perf_counter()
     result, cause = None, None
     try:
-        outcome = simulate(scene, workers, None, stop, notice=None)
+        outcome = simulate(scene, workers, None, stop, notice=None, only_steady=True)
         cause = heat_fault(outcome)
         result = None if cause else outcome.as_dict()
     except (CancelledError, MemoryError, OSError):

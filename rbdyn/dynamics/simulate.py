@@ -61,6 +61,7 @@ def simulate(
     target: float | None = None,
     notice: Notice = log,
     overrides: Iterable[str] = (),
+    only_steady: bool = False,
 ) -> SimulationResult:
     """Simulate all replicates of a scene, which may be the path of its file.
 
@@ -70,6 +71,7 @@ def simulate(
     - ``notice(sentence)`` is called once with the time that the runs still take; by default it is a warning of the logger
       "rbdyn", None for silence
     - ``overrides``: keys of the scene with other values, such as ``["cage.mass_g=50"]``
+    - ``only_steady``: raise RunError once the short runs of a heat balance show no steady state, instead of a run of its last state
 
     Raises InputError for a faulty scene or override, another kind of bearing, and an impossible target or number of workers.
     Raises RunError when a replicate cannot go on, KeyboardInterrupt on Ctrl-C.
@@ -84,7 +86,7 @@ def simulate(
         from rbdyn.dynamics.temperatures import with_temperatures
 
         point_before(scene)  # A faulty one is refused before anything runs.
-        balanced = with_temperatures(scene, run, _gather, progress)
+        balanced = with_temperatures(scene, run, _gather, progress, only_steady)
         if scene.thermal.start is None:
             return balanced.result
         from rbdyn.dynamics.start import with_start

@@ -276,10 +276,14 @@ class Balanced(NamedTuple):
     path: list[State]
 
 
-def with_temperatures(scene: Scene, simulate: Simulate, gather: Gather, progress: Reporter = None) -> Balanced:
-    """The result of a scene with [thermal]. Raises as ``verdict_of``."""
+def with_temperatures(
+    scene: Scene, simulate: Simulate, gather: Gather, progress: Reporter = None, only_steady: bool = False
+) -> Balanced:
+    """The result of a scene with [thermal]; ``only_steady``: or RunError once short runs show no steady state. Raises as ``verdict_of``."""
     balance = Balance(scene, simulate)
     verdict = verdict_of(balance)
+    if only_steady and not verdict.steady:
+        raise RunError(f"{verdict.status}: {verdict.reason}")
     path, temperatures = verdict.path, verdict.temperatures
     for _ in range(MOST_WHOLE_RUNS if verdict.steady else 1):
         state = balance.at(temperatures, True, progress)

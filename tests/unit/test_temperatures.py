@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from rbdyn import Scene, history, simulate
-from rbdyn.base.faults import InputError, read_toml
+from rbdyn.base.faults import InputError, RunError, read_toml
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.result import SimulationResult
 from rbdyn.scene.notes import heat_notes
@@ -139,15 +139,12 @@ def test_unit_more_flow_and_more_cooling_are_cooler(hot):
 
 def test_unit_a_polymer_cage_that_grows_into_its_land_is_a_verdict():
     """Unit: a PEEK cage with room when cold, whose own heat closes its guide: seizure, with the last state, exit as a failure."""
-    result = simulate(
-        _scene(
-            materials={"cage": "peek"},
-            cage={"guide_clearance_mm": 0.17, "mass_g": 7.0},
-            lubricant={**FLOW, "oil_inlet_temperature_C": 75.0},
-        ),
-        workers=1,
-        notice=None,
+    scene = _scene(
+        materials={"cage": "peek"},
+        cage={"guide_clearance_mm": 0.17, "mass_g": 7.0},
+        lubricant={**FLOW, "oil_inlet_temperature_C": 75.0},
     )
+    result = simulate(scene, workers=1, notice=None)
     assert result.status == "seizure" == result.thermal["status"]
     assert (
         "the cage seizes" in result.thermal["reason"]
@@ -156,6 +153,11 @@ def test_unit_a_polymer_cage_that_grows_into_its_land_is_a_verdict():
     )
     assert result.temperatures_C["oil"].error is None
     assert result.clearance_um["guide"]["operating"] > 6.0
+    # A run that only a steady state is asked of ends with the same words before its first run of full length.
+    long = list[tuple[int, int]]()
+    with pytest.raises(RunError) as caught:
+        simulate(scene, 1, lambda done, total: long.append((done, total)), notice=None, only_steady=True)
+    assert str(caught.value) == f"{result.status}: {result.thermal['reason']}" and not long
 
 
 def test_unit_above_a_ceiling():
