@@ -190,7 +190,7 @@ def _keys_of(tables: Mapping[str, Any], name: str, prefix: str, file: str) -> It
         nested += [(kind["items"], "[]") for kind in kinds if "$ref" in kind.get("items", {})]
         plain = [kind for kind in kinds if "$ref" not in kind and "$ref" not in kind.get("items", {})]
         values = " or ".join(
-            filter(None, [*map(_values, plain), *("a list of tables" if m else "a table" for _, m in nested)])
+            filter(None, [*map(_values, plain), *("list of tables" if mark else "table" for _, mark in nested)])
         )
         default = None if nested and not plain else node.get("default")
         yield Key(whole, file, _unit(key), values, default, required, node["description"], _unknown(whole))
@@ -217,17 +217,13 @@ def _values(node: Mapping[str, Any]) -> str:
     kind = node.get("type")
     if kind == "array":
         items = node.get("items")
-        return f"a list of {_plural(_values(items))}" if items else f"a list of {len(node['prefixItems'])} numbers"
-    if kind == "object":
-        return "a table"
-    names = {"number": "number", "integer": "whole number", "boolean": "true or false", "string": "text"}
-    return " ".join(filter(None, [names.get(str(kind), "anything"), _range(node)]))
+        of = _plural(_values(items)) if items else f"{len(node['prefixItems'])} numbers"
+        return f"list of {of}" if of else "list"
+    return " ".join(filter(None, ["table" if kind == "object" else str(kind or ""), _range(node)]))
 
 
 def _plural(values: str) -> str:
-    if values.startswith("a list"):
-        return values.replace("a list", "lists", 1)
-    return re.sub("^(whole )?(number|text)", r"\1\2s", values)
+    return re.sub("^(number|integer|string|list|table)", r"\1s", values)
 
 
 def _range(node: Mapping[str, Any]) -> str:

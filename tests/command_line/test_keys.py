@@ -105,7 +105,7 @@ def test_a_word_is_looked_up_in_names_and_descriptions():
     assert "cage.mass_g" not in shown and "model.land_film_floor_um" not in shown
     assert printed(rbdyn_app, "CAGE.MASS_G").splitlines()[2] == "cage.mass_g: number from 0.01 to 1e+06, g, required"
     assert "numerics.rtol: number from 1e-13 to 0.1, default 0.01" in printed(rbdyn_app, "rtol")
-    assert "factor[].name: text, required" in printed(doe_app, "factor")
+    assert "factor[].name: string, required" in printed(doe_app, "factor")
     assert "link[].capability: number above 0, default 1" in printed(doe_app, "capability")
 
 
@@ -205,15 +205,15 @@ def test_package_shows_its_names():
 
 
 def test_lists_of_lists_are_told_in_plain_words():
-    """Command line: values of nested lists, of whole numbers and of plain ones."""
+    """Command line: values of nested lists, of integers and of plain ones."""
     values = {key.key: key.values for key in keys(SCENES)}
-    assert values["bearing.profile_table_mm_um"] == "a list of lists of numbers"
-    assert values["errors.ball_sphericity[].balls"] == "a list of whole numbers from 1"
+    assert values["bearing.profile_table_mm_um"] == "list of lists of numbers"
+    assert values["errors.ball_sphericity[].balls"] == "list of integers from 1"
 
 
 def test_keys_of_calibration():
     """Command line: ``doe keys`` finds the settings of a calibration and every column that the rig's table may have."""
-    assert "\ncalibrate.waves: whole number from 1 to 8, default 4\n" in printed(doe_app, "calibrate")
+    assert "\ncalibrate.waves: integer from 1 to 8, default 4\n" in printed(doe_app, "calibrate")
     outputs = {name + end for name in rig.OUTPUTS for end in ("", rig.SD, rig.ACCURACY)}
     assert set(RigTable.model_fields) == {rig.TURNS, rig.HOLD} | outputs
     assert "calibrate" not in json.loads(printed(doe_app, "--schema"))["$defs"]["StudyFile"]["properties"]
@@ -222,7 +222,7 @@ def test_keys_of_calibration():
 def test_keys_of_a_table_begin_with_what_it_needs():
     """Command line: the table that a word names comes before the keys that only mention it."""
     lines = printed(rbdyn_app, "thermal").splitlines()
-    assert lines[:3] == ["roller bearing", "==============", "thermal: a table, optional"]
+    assert lines[:3] == ["roller bearing", "==============", "thermal: table, optional"]
     assert "Needs [mounting] with bore" in " ".join(lines[3:8]) and lines[8].startswith("thermal.ambient_C: ")
 
 
