@@ -74,9 +74,9 @@ class PressFit(Strict):
     """Diameter whose change the link is. If larger than the fit it is on the outer part and grows, if smaller it is on the
     inner part and shrinks."""
     shaft_bore_mm: NonNegative | None = None
-    """Bore of the inner part; by default 0, or the raceway if it is on this part."""
+    """Bore of the inner part. Default: 0, or the raceway if it is on this part."""
     outside_mm: Positive | None = None
-    """Outside diameter of the outer part; by default the raceway if it is on this part, else required."""
+    """Outside diameter of the outer part. Default: the raceway if it is on this part, otherwise required."""
     shaft_modulus_GPa: Positive = 206.0  # noqa: N815
     """Young's modulus of the inner part; steel."""
     bore_modulus_GPa: Positive = 206.0  # noqa: N815
@@ -122,7 +122,7 @@ class Link(Strict):
     distribution: Distribution = "normal"
     """Distribution of the manufactured parts."""
     mean_mm: Bounded | None = None
-    """Mean of the manufactured parts, as a deviation from the nominal; by default the middle of the tolerance."""
+    """Mean of the manufactured parts, as a deviation from the nominal. Default: the middle of the tolerance."""
     capability: Positive = 1.0
     """T/(6 sigma) of a normal or truncated normal part."""
     estimated: bool = False
@@ -174,7 +174,7 @@ class Allocate(Strict):
     target_yield: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.9973
     """Share of the assemblies that mode = "yield" keeps within the limits; 3 sigma."""
     adjust: str | None = None
-    """Part whose nominal is moved; by default the first that is not fixed, if possible of positive coefficient."""
+    """Part whose nominal is moved. Default: the first that is not fixed, if possible with a positive coefficient."""
     resolution_mm: Annotated[float, Field(ge=0.0, le=1.0)] = 0.001
     """Resolution of the drawing, to which nominals and deviations of allocated parts are rounded, so that the closing link stays
     within its limits; 0 leaves them unrounded. Stated deviations are never rounded."""
@@ -210,9 +210,9 @@ class Chain(Strict):
     """A closing link, its links, and the allocation of their tolerances."""
 
     closing_link: ClosingLink
-    """The gap or dimension that the links make."""
+    """Gap or dimension that results from the links."""
     link: Annotated[list[Link], Field(min_length=1)]
-    """The links."""
+    """Links of the chain."""
     allocate: Allocate = Allocate()
     """Allocation of tolerances."""
     monte_carlo: MonteCarlo = MonteCarlo()

@@ -179,7 +179,7 @@ class Chains(Strict):
     """A file of several chains."""
 
     chain: Annotated[list[NamedChain], Field(min_length=1)]
-    """The chains."""
+    """Dimension chains of this file."""
 
 
 def chain_from(data: Mapping[str, Any], source: str) -> Chain:

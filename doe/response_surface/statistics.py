@@ -375,7 +375,7 @@ def _collinearity(fit: Fit) -> str:
         return ""
     return (
         f"the runs hardly separate {', '.join(inflated)} from the other terms (variance inflation factor up to "
-        f"{max(filter(None, fit.inflation.values())):.2g}): their coefficients and p values say little; drop one of them, or add runs that vary them apart."
+        f"{max(filter(None, fit.inflation.values())):.2g}), so these coefficients are uncertain: drop one, or add runs that vary them apart."
     )
 
 
@@ -384,21 +384,21 @@ def _lack_of_fit(fit: Fit) -> str:
     tests = {"pure error": fit.lack_of_fit.p, "the known variance": None if known is None or known.refuted else known.p}
     values = {what: p for what, p in tests.items() if p is not None}
     if not values and fit.pure_error.df == 0:
-        return "lack of fit cannot be tested, for no run is replicated; add centre replicates."
+        return "lack of fit cannot be tested, because no run is replicated; add centre replicates."
     if not values and fit.lack_of_fit.df == 0:
-        return "lack of fit cannot be tested, for the model has as many terms as distinct points."
+        return "lack of fit cannot be tested, because the model has as many terms as distinct points."
     if fit.pure_error.ms == 0.0:
         verdict = "certain" if fit.lack_of_fit.ss else "none"
-        return f"lack of fit is {verdict}, for the replicates agree exactly and the residual is {'not ' if verdict == 'certain' else ''}zero."
+        return f"lack of fit is {verdict}, because the replicates agree exactly and the residual is {'not ' if verdict == 'certain' else ''}zero."
     listed = ", ".join(f"{p_text(p)} against {what}" for what, p in values.items())
     if min(values.values()) > ALPHA:
         return (
             f"lack of fit is not significant ({listed}): the error of the surface is within the scatter of replicates."
         )
     if max(values.values()) > ALPHA:
-        return f"lack of fit is in doubt, for the tests disagree ({listed}): confirm predictions by runs, or add replicates."
+        return f"lack of fit is in doubt, because the tests disagree ({listed}): confirm predictions by runs, or add replicates."
     return (
-        f"lack of fit is significant ({listed}): the error of the surface exceeds the scatter of replicates; enlarge the model, "
+        f"lack of fit is significant ({listed}): the surface error exceeds the scatter of replicates. Enlarge the model, "
         "transform the response or narrow the region, and confirm predictions by runs."
     )
 
@@ -406,7 +406,7 @@ def _lack_of_fit(fit: Fit) -> str:
 SHOWN_BY: Mapping[Source, str] = {
     "repeats": "shown by repeats",
     "known variance": "shown by the known variance",
-    "residual": "which is the whole residual, for no scatter of a run is known",
+    "residual": "which is the whole residual, because no scatter of a run is known",
 }
 
 

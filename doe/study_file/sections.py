@@ -42,19 +42,19 @@ class Factor(Consistent):
     name: Name
     """Name of the factor in tables and messages."""
     key: Annotated[str, Field(min_length=3)] = ""
-    """Its key in the scene, such as cage.pocket_clearance_mm; needed with [scene]."""
+    """Key of the factor in the scene file, such as cage.pocket_clearance_mm. Required with [scene]."""
     centre: Number
     """Value at coded 0."""
     step: Positive
     """Change of the value per coded unit."""
     resolution: Positive | None = None
-    """Resolution of the drawing, to which the pick is rounded; without it the pick is not rounded."""
+    """Resolution of the drawing, to which the selected design is rounded. Default: no rounding."""
     tolerance: Positive | None = None
     """Manufacturing tolerance, as a half width."""
     whole: bool = False
-    """Whether the factor is a whole number, such as that of rollers; runs and pick are rounded."""
+    """Whether the factor is an integer, such as the number of rollers. Runs and the selected design are then rounded."""
     allowed: Annotated[list[Number], Field(min_length=2, max_length=2)] | None = None
-    """Lowest and highest value of an adaptive search; without it the search stays in the region of the design."""
+    """Lowest and highest value of an adaptive search. Default: the search stays in the design region."""
 
     def faults(self) -> Iterator[str]:
         if self.step < FINEST * abs(self.centre):
@@ -108,16 +108,17 @@ class Design(Consistent):
     cube: Literal["full", "resolution_v"] = "full"
     """Cube of a central composite design: all corners, or a fraction of resolution V."""
     centre_replicates: Annotated[int, Field(ge=0, le=100)] | None = None
-    """Runs at the centre; by default 6 for central composite and Box-Behnken designs, 1 for definitive screening, else
+    """Runs at the centre. Default: 6 for central composite and Box-Behnken designs, 1 for definitive screening, otherwise
     none."""
     blocks: bool = False
     """Whether the runs form orthogonal blocks."""
     levels: Annotated[int, Field(ge=2, le=100)] = 3
-    """Levels a factor of a full factorial."""
+    """Levels of each factor in a full factorial design."""
     runs: Annotated[int, Field(ge=2, le=10000)] = 60
-    """Runs of a Latin hypercube or Sobol sequence. An optimal design needs it: its runs besides those at the centre."""
+    """Runs of a Latin hypercube or Sobol sequence. For an optimal design it is required: its runs without those at the
+    centre."""
     order: Literal["standard", "random"] = "standard"
-    """Order of the runs. The seed of a run is seed plus its place in the standard order, in either order."""
+    """Order of the runs. In either order the seed of a run is seed plus its place in the standard order."""
     seed: Annotated[int, Field(ge=0)] = 1
     """Seed of the design and of its runs."""
 
@@ -145,8 +146,8 @@ class Goal(Consistent):
     """Goal and limits of a response."""
 
     goal: Literal["min", "max", "target", "none"] = "min"
-    """Goal: a small value, a large one, one near target, or "none" (the response is observed, or has limits only). A response
-    that states a limit and no wish (goal, target or weight) has none."""
+    """Goal: a small value, a large one, one near target, or "none" (the response is only observed or limited). A response with
+    a limit but without goal, target and weight has the goal "none"."""
     target: Figure | None = None
     """Desired value, for goal = "target"."""
     lower: Figure | None = None
@@ -154,7 +155,7 @@ class Goal(Consistent):
     upper: Figure | None = None
     """Limit that the response must not exceed."""
     weight: Positive = 1.0
-    """Weight in the desirability and weights picks."""
+    """Weight of the response if front.pick is "desirability" or "weights"."""
 
     @model_validator(mode="before")
     @classmethod
@@ -182,7 +183,7 @@ class Front(Strict):
     seed: Annotated[int, Field(ge=0)] = 1
     """Seed of the search."""
     pick: Literal["knee", "desirability", "weights"] = "knee"
-    """Rule of the pick among the points of the front that dominate the baseline."""
+    """Rule that selects a design among the points of the front that dominate the baseline."""
     draws: Annotated[int, Field(ge=100, le=100000)] = 1000
     """Random draws of the surfaces for the front's uncertainty."""
     tolerance_aware: Literal["none", "worst_case", "quantile"] = "none"
@@ -197,32 +198,33 @@ class Adaptive(Strict):
     """The search with emulators, which begins with the runs of the design."""
 
     budget: Annotated[int, Field(ge=10, le=10000)] = 100
-    """All runs: those of the design, those of the search, and a last fifth of fresh runs at the points of the front."""
+    """Number of all runs: the design, the search, and a last fifth for confirmation at the points of the front."""
     batch: Annotated[int, Field(ge=1, le=1000)] = 8
-    """Runs chosen at once, so that many workers have work; one by one each would be chosen a little better."""
+    """Runs per batch. Effect: larger batches keep more workers busy; smaller batches choose each run slightly better."""
     extend: bool = True
-    """Whether the region grows where the front lies at its edge, up to the factors' "allowed" ends."""
+    """Whether the design region grows where the front lies at its bound, up to the factors' "allowed" ends."""
     least_clearance_um: Annotated[float, Field(ge=-1000.0, le=1000.0)] = 0.0
     """Least diametral clearance of the bearing in operation, mounted, hot and at speed, wherever the region grows; below 0 it is
     preloaded. The least guide clearance follows from the scene, by the floor of the land's film."""
     seed: Annotated[int, Field(ge=0)] = 1
     """Seed of the search and its runs."""
     set: list[str] = []
-    """Overrides of the scene's keys, as "key=value". A run whose figures drift grows to twice its turns at most, unless
-    numerics.extend_limit is set here or is less in the scene."""
+    """Keys that differ from the scene file in these runs, as "key=value". A run whose results drift grows to twice its turns
+    at most, unless numerics.extend_limit is set here or is less in the scene file."""
 
 
 class Robust(Consistent):
     """Whether the pick beats the baseline over the unknown inputs of the scene: with --robust, or where this table is written."""
 
     points: Annotated[int, Field(ge=32, le=1024)] = 256
-    """Input sets, a power of two; the baseline and the pick are simulated at each."""
+    """Number of input sets, a power of two. Baseline and selected design are simulated at each of them."""
     settle: Annotated[float, Field(ge=0.0, le=4.0)] = 0.5
-    """Further simulations of input sets with a doubtful gain, as a share of the first simulations."""
+    """Further simulations of input sets with a doubtful improvement, as a share of the first simulations."""
     front: Literal["quantile", "mean", "none"] = "quantile"
-    """A robust front: by the quantile or the mean of each gain over the unknown inputs. Some of its points are simulated too."""
+    """Robust front, by the quantile or the mean of each improvement over the unknown inputs. Some of its points are
+    simulated."""
     quantile: Annotated[float, Field(gt=0.0, lt=0.5)] = 0.1
-    """Quantile of a robust front: the share of cases in which a gain is smaller."""
+    """Quantile of a robust front: the share of input sets in which the improvement is smaller."""
 
     def faults(self) -> list[str]:
         return no_power_of_two("points = ", self.points)
@@ -232,22 +234,24 @@ class Tolerances(Strict):
     """Widest tolerances of the factors about the pick."""
 
     probability: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.95
-    """Probability that a part keeps its share of every gain that counts, and all limits."""
+    """Probability that a part keeps the required share of every improvement that counts, and meets all limits."""
     keep: Annotated[float, Field(ge=0.0, le=1.0)] = 0.5
-    """Share of each predicted gain that counts which a part must keep, where at_least does not state it."""
+    """Share of each improvement that the parts must keep, unless at_least states it."""
     gains: Annotated[list[str], Field(min_length=1)] | None = None
-    """Responses whose gains count, with those of at_least. Without both keys, a predicted gain of at least three times
-    smallest_difference_percent counts; if none is so large, all real gains count."""
+    """Responses whose improvement the parts must keep, in addition to those in at_least. Default (neither key set): every
+    predicted improvement of at least three times smallest_difference_percent; if there is none, every significant
+    improvement."""
     at_least: dict[str, NonNegative] = {}
-    """Gain over the baseline that a part must keep at least, by response, in percent of the baseline."""
+    """Smallest improvement that the parts must keep, by response, in percent of the baseline."""
     smallest_difference_percent: Positive = 1.0
     """Smallest difference of a response that matters, in percent of the baseline."""
     finest_grade: Annotated[int, Field(ge=1, le=18)] = 4
-    """Finest grade of ISO 286 that can be manufactured. Parts of a finer one are a warning, with the response that requires them."""
+    """Finest ISO 286 grade that can be manufactured. Effect: finer parts cause a warning that names the response
+    responsible."""
     distribution: Literal["normal", "uniform"] = "normal"
     """Distribution of the parts within the tolerances."""
     samples: Annotated[int, Field(ge=100, le=1_000_000)] = 4096
-    """Random parts."""
+    """Number of random parts."""
     seed: Annotated[int, Field(ge=0)] = 1
     """Seed of the parts."""
 
@@ -256,10 +260,10 @@ class CageLimit(Strict):
     """Limits on the cage."""
 
     verdict: Annotated[str, AfterValidator(_classes)] | None = None
-    """Classes that the cage may have by its orbit, such as "held|circling", at every point of a duty. The simulated pick keeps the limit
-    where its replicates name one of them, and breaks it where they name another. No surface has a class, so front and pick stay where the
-    cage of the nearest run keeps the limit. With --robust its probability over the unknown inputs is
-    the mean part of the replicates of the input sets that have one of them."""
+    """Classes that the cage may have by its orbit, such as "held|circling", at every operating point. The selected design
+    meets the limit if its replicates show one of these classes, and violates it if they show another. Surfaces cannot predict
+    a class, so front and selected design stay where the cage of the nearest run meets the limit. With --robust the probability
+    is the mean share of replicates with one of these classes over the input sets."""
 
 
 class OtherLimits(Strict):
@@ -285,9 +289,10 @@ class StudyChain(Consistent):
     name: Annotated[str, Field(min_length=1)]
     """Name of the chain."""
     factor: str
-    """The factor whose picked value the chain must close."""
+    """Factor whose selected value the chain must produce."""
     half_width_mm: Annotated[float, Field(gt=0.0)] | None = None
-    """Half width of the closing link about the pick; by default the widest tolerance of the factor that the study finds."""
+    """Half width of the closing link about the selected value. Default: the widest tolerance of the factor that the study
+    finds."""
     file: str | None = None
     """CHAIN.toml next to the study, with the links under the chain's name."""
     link: list[dict[str, Any]] = []
@@ -313,10 +318,10 @@ class OverDuty(Goal):
     """How a response follows from its figures at the points of the duty."""
 
     aggregate: Aggregate = "mean"
-    """Figure over the points of [[duty]]: "mean" weighs them by their shares; "worst" is the worst of them for the goal, the
-    largest without one; "worst_relative" is the worst ratio to the baseline at the same point."""
+    """How the operating points of [[duty]] are combined. "mean" weights them by their shares. "worst" is the worst of them for
+    the goal, or the largest without a goal. "worst_relative" is the worst ratio to the baseline at one point."""
     points: Annotated[list[str], Field(min_length=1)] | None = None
-    """Names of the points of [[duty]] at which the limits of the response hold; by default all."""
+    """Names of the points of [[duty]] at which the limits of the response hold. Default: all."""
 
 
 def at_point(point: str, figure: str) -> str:

@@ -61,16 +61,17 @@ class SceneFile(Strict):
     """Scene of all runs; ``set`` overrides its keys for the design runs."""
 
     file: str
-    """The scene file, next to the study."""
+    """Name of the scene file, relative to the folder of the study."""
     set: list[str] = []
-    """Overrides of the scene's keys for the design runs, as "key=value"; not of factors and seeds."""
+    """Keys that differ from the scene file in the design runs, as "key=value"; factors and seeds are not allowed."""
 
 
 class Fitted(Strict):
     """Fit of a surface to a response."""
 
     model: Model = "quadratic"
-    """Terms of the surface: "interaction" has products of two factors, "pure_quadratic" squares, "quadratic" both; "reduced" keeps those of the quadratic that are significant, with their hierarchy."""
+    """Terms of the surface: "interaction" has products of two factors, "pure_quadratic" squares, "quadratic" both; "reduced"
+    keeps the significant quadratic terms, with their hierarchy."""
     transform: Literal["none", "box_cox"] | Annotated[float, Field(ge=-5.0, le=5.0)] = "none"
     """Transform of Box and Cox before the fit: none, the recommended one, or one with this exponent."""
 
@@ -83,14 +84,14 @@ class Response(Fitted, OverDuty):
     """A response of the simulation, the fit of its surface, its goal and its limits."""
 
     name: Annotated[Name, BeforeValidator(lambda name: PLACES.get(name, name) if isinstance(name, str) else name)]
-    """Name of the response: a figure of the simulation, or a column of the table."""
+    """Name of the response: a result of the simulation, or a column of the table."""
 
 
 class PointResponse(Response):
     """A limited ``figure`` of the simulation at one ``point`` of the duty, without a goal."""
 
     figure: str
-    """Name of the figure."""
+    """Name of the result."""
     point: str
     """Name of the point."""
 
@@ -107,10 +108,10 @@ class Confirmation(Strict):
     replicates: Annotated[int, Field(ge=2, le=10000)] = 16
     """Replicates of each point that is simulated for confirmation."""
     limit_probability: Annotated[float, Field(ge=0.5, le=0.9999)] = 0.95
-    """Probability with which the simulated pick must keep each limit; the default leaves 5 % for a broken limit."""
+    """Probability with which the simulated design must meet each limit. The default leaves 5 % for a violated limit."""
     tries: Annotated[int, Field(ge=1, le=20)] = 4
-    """Most points of the front that are simulated until one keeps its limits. Each takes a simulation and a search, which
-    uses the errors of the surfaces at the earlier points."""
+    """Largest number of points of the front that are simulated until one meets its limits. Each takes a simulation and a
+    search, which uses the errors of the surfaces at the earlier points."""
     set: list[str] = []
     """Overrides of the scene's keys, as "key=value"."""
 
@@ -130,17 +131,17 @@ class StudyFile(Consistent):
     """The whole file."""
 
     scene: SceneFile | None = None
-    """The scene of all runs; none if all runs come from a table."""
+    """Scene of all runs. Leave it out if all runs come from a table."""
     duty: list[DutyPoint] = []
-    """Points of operation at which every run is simulated, up to 12; without them the scene's own is the only one."""
+    """Operating points at which every run is simulated, up to 12. Default: the operating point of the scene file."""
     normalise_shares: bool = False
-    """Whether the shares of the duty may have any sum, such as hours: they are then divided by it."""
+    """Whether the shares can have any sum, such as hours. They are then divided by their sum."""
     factor: Annotated[list[Factor], Field(min_length=1, max_length=MOST_FACTORS)]
-    """The factors."""
+    """Factors that the study varies."""
     response: Annotated[list[Response], Field(min_length=1)]
-    """The responses."""
+    """Responses that the study fits and optimises."""
     limits: OtherLimits = OtherLimits()
-    """Limits that no figure has: limits.cage.verdict = "held|circling"."""
+    """Limits on the class of the cage: limits.cage.verdict = "held|circling"."""
     design: Design = Design()
     """The design of the runs."""
     front: Front = Front()
@@ -148,17 +149,17 @@ class StudyFile(Consistent):
     adaptive: Adaptive = Adaptive()
     """The search with emulators, with --adaptive."""
     robust: Robust = Robust()
-    """The judgement over unknown inputs, with --robust or where this table is written."""
+    """Comparison of the designs over unknown inputs, with --robust or if this table is present."""
     uncertain: Uncertain | None = None
-    """Unknown inputs of the scene; they replace those that the scene declares."""
+    """Unknown inputs of the scene. They replace the unknown inputs of the scene file."""
     tolerances: Tolerances | None = None
-    """The widest tolerances of the factors about the pick; without it none are sought."""
+    """Search for the widest tolerances of the factors about the selected design. Default: no search."""
     confirmation: Confirmation = Confirmation()
-    """The simulation at the baseline and at the pick."""
+    """Simulation of the baseline and the selected design."""
     baseline: dict[str, Number] = {}
-    """Values of the original design by factor; by default the centre."""
+    """Values of the baseline design by factor. Default: the centre."""
     chain: list[StudyChain] = []
-    """Dimension chains that the pick's clearances close."""
+    """Dimension chains whose closing links are clearances of the selected design."""
     reference: Reference | None = None
     """A published table of the same design to compare with."""
 

@@ -207,8 +207,8 @@ def advice(study: Problem) -> list[str]:
         return []
     design = len(study.design.coded)
     return [
-        f"the front on the surfaces is biased: lack of fit is significant for {', '.join(lacking)}; --adaptive searches the front "
-        f"with emulators of the simulator, in {max(study.file.adaptive.budget - design, 0)} runs beyond the {design} of the design"
+        f"the predicted front is biased, because lack of fit is significant for {', '.join(lacking)}. Use --adaptive: it searches "
+        f"with emulators and needs {max(study.file.adaptive.budget - design, 0)} more runs"
     ]
 
 

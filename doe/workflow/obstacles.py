@@ -349,8 +349,8 @@ def unlikely(study: Problem, missed: Sequence[Limit], coded: Array, results: Seq
         if min(excess.min(), least) > 2.0 * errors[:, column].max():
             nearest, end = (shown(limit.bound + sign * value, 3) for value in (float(excess.min()), least))
             sentences.append(
-                f"likely no point keeps {limit.bound_words}: the nearest of {counted(len(sound), 'corner')} has {nearest}, and a plane "
-                f"through them {end} at the bounds of the region; to change the limit, stop by Ctrl-C (finished runs are kept)"
+                f"likely no point meets {limit.bound_words}: the nearest of {counted(len(sound), 'corner')} has {nearest}, and a plane "
+                f"through them {end} at the bounds. To change the limit, stop with Ctrl-C (finished runs are kept)"
             )
     return sentences
 

@@ -246,9 +246,10 @@ class Rows(Strict):
     Of each output NAME_sd is the scatter of the single row, and NAME_accuracy_percent the offset that all rows share."""
 
     turns: Positive | None = None
-    """Shaft turns of the measurement: its scatter is that of a run as long, where no standard deviation is stated."""
+    """Shaft turns of the measurement. Effect: without a stated standard deviation, the scatter of a simulation of this length
+    is used."""
     hold: Literal["1", "yes", "true", "0", "no", "false"] | None = None
-    """Whether the row is held out of the calibration to test it: 1 for a row that is held out, else 0."""
+    """Whether the row is held out of the calibration to test it: 1 if held out, otherwise 0."""
 
 
 def _columns(figure: Figure) -> dict[str, Any]:

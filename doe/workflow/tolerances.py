@@ -248,13 +248,15 @@ class PickTolerances:
             sentences.append(f"{_begun(cause)} requires parts finer than {grade}: {self._listed(fine)}.")
         if fine and self.relaxed is not None:
             wider, limit = self.relaxed._listed(fine), _limit_words(self.relaxed.widest.limited_by)
-            sentences.append(f"Without {cause} the tolerance would be {wider}, limited by {limit}.")
-            sentences.append(f"Then, in 95 % of the parts: {self.relaxed._spread([self.limiting_gain])}.")
+            sentences.append(f"Without this requirement the tolerance could be {wider}, limited by {limit}.")
+            sentences.append(f"Then 95 % of the parts have {self.relaxed._spread([self.limiting_gain])}.")
         elif fine:
-            sentences.append("A pick farther from it has wider tolerances.")
+            sentences.append("A design farther from this limit would allow wider tolerances.")
         if rim:
-            sentences.append(f"The bound of the region requires parts finer than {grade}: {self._listed(rim)}.")
-            sentences.append("A wider design gives these more space.")
+            sentences.append(
+                f"The design region limits the tolerance to parts finer than {grade}: {self._listed(rim)}."
+            )
+            sentences.append("A wider region would allow wider tolerances.")
         return " ".join(sentences)
 
     def _listed(self, names: Sequence[str]) -> str:

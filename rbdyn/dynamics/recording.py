@@ -446,20 +446,19 @@ def length_notes(scene: Scene, runs: Sequence[Replicate], stage: Stage, since: i
     if stage.lengthened:
         dropped = float(runs[0].durations[: stage.first].sum()) / turn_s
         sentence = (
-            f"length: figures drifted: {dropped + counted:.4g} shaft turns per replicate instead of "
-            f"{numerics.warm_up_turns + numerics.turns:.4g}; the last {counted:.4g} are counted (numerics.extend = false "
-            "forbids it)"
+            f"length: results drifted, so each replicate was extended from {numerics.warm_up_turns + numerics.turns:.4g} to "
+            f"{dropped + counted:.4g} shaft turns. The last {counted:.4g} count. Set numerics.extend = false to prevent this"
         )
         notes.append(Note("lengthened", sentence))
     if scene.operation.schedule is None and not settled(runs, since):
         fix = (
-            "raise numerics.extend_limit" if scene.extends else "lengthen numerics.turns or set numerics.extend = true"
+            "Raise numerics.extend_limit" if scene.extends else "Lengthen numerics.turns or set numerics.extend = true"
         )
         if not fits(scene, grown(scene, stage)):
-            fix = "take fewer replicates: there is no memory for longer ones"
+            fix = "Take fewer replicates: there is not enough memory for longer ones"
         sentence = (
-            f"transient: figures still drift over the {counted:.4g} turns counted, or differ by how replicates start, so no "
-            f"statistical error is known; {fix}"
+            f"transient: results still drift over the {counted:.4g} counted turns, or differ by how replicates start, so no "
+            f"statistical error is known. {fix}"
         )
         notes.append(Note("drift", sentence))
     return tuple(notes)

@@ -230,8 +230,8 @@ def _balance_notes(scene: Scene, power_gap: float) -> Notes:
     if power_gap <= LARGEST_POWER_GAP:
         return ()
     sentence = (
-        f"power balance: closes only to {100.0 * power_gap:.2g} %: numerics.rtol = {scene.numerics.rtol:g} is too loose for "
-        "this scene; loose tolerances bias impact and whirl upward, power loss downward; tighten it tenfold"
+        f"power balance: closes only to {100.0 * power_gap:.2g} %, because numerics.rtol = {scene.numerics.rtol:g} is too loose. "
+        "Loose tolerances bias impact and whirl upward, power loss downward. Reduce it tenfold"
     )
     return (Note("power-balance", sentence),)
 
@@ -244,8 +244,8 @@ def _model_notes(scene: Scene) -> Notes:
         notes.append(Note("definition", sentence))
     if scene.traction.model == "four_constant":
         sentence = (
-            "traction: one load-independent set of constants; lightly loaded rollers are driven too hard and skidding is "
-            "under-predicted"
+            "traction: one curve is used for all loads. It overestimates traction on lightly loaded rollers and so underestimates "
+            "skidding. Use traction.model = 'thermal_newtonian', or 'limiting_shear' for an oil without its constants"
         )
         notes.append(Note("left-out", sentence))
     if scene.traction.model == "thermal_newtonian" and scene.lubricant.viscosity_mPas is not None:

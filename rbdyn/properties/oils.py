@@ -173,9 +173,8 @@ def oil_named(text: str) -> NamedOil:
     if re.fullmatch(r"(?:mobil )?jet (?:oil )?(?:ii|2)", plain, re.IGNORECASE):
         return NamedOil(next(iter(TURBINE_OILS)))
     raise MethodError(
-        f"is no oil known here; write ISO VG {', '.join(map(str, GRADES[:-1]))} or {GRADES[-1]}, with "
-        f"{', '.join(BASE_OILS)} behind it and grease before it as needed, or 7808, 23699, 85734, Jet Oil II; own "
-        "data go into [lubricant] as oil = 'data_sheet'"
+        f"is not a known oil; write ISO VG {', '.join(map(str, GRADES[:-1]))} or {GRADES[-1]} (with grease before it, "
+        f"{', '.join(BASE_OILS)} behind it), 7808, 23699, 85734 or Jet Oil II. Own data: oil = 'data_sheet' in [lubricant]"
     )
 
 

@@ -296,8 +296,8 @@ def _runaway(machine: Machine, path: Path) -> str:
         return ""
     here = path.here[row].figures
     return (
-        f"the preload runs away, for the gain of heat and temperature is above 1 from {path.rows.times[row]:.3g} s on; then the inner "
-        f"ring is {here[DIFFERENCE]:.0f} K over the outer one and a contact has {here['contact_pressure_MPa']:.0f} MPa; "
+        f"the preload runs away: from {path.rows.times[row]:.3g} s on the thermal loop gain is above 1. There the inner ring is "
+        f"{here[DIFFERENCE]:.0f} K over the outer one and a contact has {here['contact_pressure_MPa']:.0f} MPa; "
     )
 
 

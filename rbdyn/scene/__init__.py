@@ -95,11 +95,11 @@ class Scene(SceneFile):
     UNSAVED: ClassVar[Mapping[str, Any]] = {"thermal": None, "damage": {}, "verdict": {}}
 
     bearing: Bearing
-    """The drawing of the bearing."""
+    """Dimensions of the bearing, as on its drawing."""
     cage: Cage
-    """The drawing of the cage."""
+    """Dimensions of the cage, as on its drawing."""
     lubricant: Lubricant
-    """The oil."""
+    """Oil and lubrication method."""
     operation: Operation
     """Speeds and loads."""
     mounting: Mounting | None = None
@@ -107,17 +107,18 @@ class Scene(SceneFile):
     support: Support | None = None
     """Flexible, damped support of the outer ring; without it the ring is fixed."""
     thermal: Thermal | None = None
-    """Heat balance that computes the temperatures; without it they are those of lubricant and mounting. Needs
-    [mounting] with bore, outside and housing diameter and the width of the rings, and no temperatures of parts; and lubricant.oil_flow_l_min
-    with oil_inlet_temperature_C, or a lubricant.supply without a flow: bath, drop, oil_air or grease. rbdyn new --ambient 25 writes it all."""
+    """Heat balance that computes the temperatures; Default: temperatures are given by lubricant and mounting. Needs [mounting]
+    with bore, outside and housing diameter and the width of the rings, and without temperatures of parts. Also needs
+    lubricant.oil_flow_l_min with oil_inlet_temperature_C, or a lubricant.supply without a flow: bath, drop, oil_air or grease.
+    rbdyn new --ambient 25 writes all of this."""
     materials: Materials = Materials()
     """Material of each part."""
     traction: Traction = Traction()
-    """Traction of the races."""
+    """Traction of the raceways."""
     model: Laws = Laws()
     """The laws of each interaction."""
     damage: Damage = Damage()
-    """Inputs of figures of damage."""
+    """Inputs of the damage results."""
     verdict: Verdict = Verdict()
     """Limits between the classes of a cage by its orbit."""
     numerics: Numerics = Numerics()

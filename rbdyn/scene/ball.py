@@ -40,9 +40,9 @@ class BallRow(Consistent):
     pitch_diameter_mm: Annotated[float, Field(ge=1.0, le=10000.0)]
     """Diameter of the circle through the balls' centres."""
     inner_groove_factor: GrooveFactor
-    """Radius of the inner groove over the ball's diameter: 0.515 to 0.53 in catalogue bearings."""
+    """Radius of the inner groove divided by the ball diameter. Typical: 0.515 to 0.53 in catalogue bearings."""
     outer_groove_factor: GrooveFactor
-    """Radius of the outer groove over the ball's diameter: 0.515 to 0.53 in catalogue bearings."""
+    """Radius of the outer groove divided by the ball diameter. Typical: 0.515 to 0.53 in catalogue bearings."""
     contact_angle_deg: Annotated[float, Field(ge=0.0, lt=90.0)] | None = None
     """Unloaded contact angle a_0. Default: from radial_clearance_mm by cos a_0 = 1 - P_d/(2 B), B = (f_i + f_o - 1) D."""
     radial_clearance_mm: Annotated[float, Field(ge=-2.0, le=5.0)] | None = None
@@ -55,16 +55,17 @@ class BallRow(Consistent):
     """Static load rating: the load at which the most loaded ball has a pressure of 4200 MPa (ISO 76). Default: calculated from
     the dimensions by Hertz."""
     inner_shoulder_height_mm: Positive | None = None
-    """Height of the inner ring's shoulder over the bottom of its groove, half of what a manufacturer's shoulder diameter is larger than
-    the raceway. Default: a fifth of the ball's diameter, an estimate. A published spindle bearing of 15 degrees (pitch 18 mm,
-    balls of 4.485 mm, shoulders of 15.74 and 21.4 mm) has 0.25 of it inside and 0.12 outside. For contact angles above some 32
-    degrees the default reaches 20 degrees beyond them. A note says where a contact climbs over it."""
+    """Height of the inner-ring shoulder above the groove bottom: half the difference between the catalogue's shoulder diameter
+    and the raceway diameter. Default (estimate): 0.2 ball diameters. Example: a spindle bearing of 15 degrees (pitch 18 mm,
+    balls 4.485 mm, shoulders 15.74 and 21.4 mm) has 0.25 ball diameters inside and 0.12 outside. For contact angles above
+    about 32 degrees the default reaches 20 degrees beyond the contact angle. Effect: a note warns if a contact ellipse runs
+    over the shoulder."""
     outer_shoulder_height_mm: Positive | None = None
-    """The same height of the outer ring's shoulder, with the same default."""
+    """Height of the outer-ring shoulder above the groove bottom. Default (estimate): 0.2 ball diameters."""
     bore_mm: Positive | None = None
-    """Bore of the inner ring, for the growth of rotating rings."""
+    """Bore of the inner ring, for ring expansion by rotation."""
     outside_diameter_mm: Positive | None = None
-    """Outside diameter of the outer ring, for the growth of rotating rings."""
+    """Outside diameter of the outer ring, for ring expansion by rotation."""
 
     ball_diameter, pitch_diameter, groove_centre_distance = SI("mm"), SI("mm"), SI("mm")
     radial_clearance, bore, outside_diameter = OptionalSI("mm"), OptionalSI("mm"), OptionalSI("mm")
@@ -195,9 +196,9 @@ class MiddleRing(Strict):
     outer_oil_factor: Positive = 3.3
     """Palmgren's f0 of the outer row."""
     tilt: Literal["free", "fixed"] | None = None
-    """fixed: the middle ring stays square to the outer ring; free: it tilts. Default: as operation.tilt."""
+    """Whether the middle ring can tilt against the outer ring. Default: as operation.tilt."""
     axial_offset_mm: Annotated[float, Field(ge=-1000.0, le=1000.0)] = 0.0
-    """Axial distance of the inner row's ball plane from that of the outer row in the unloaded bearing."""
+    """Axial distance between the ball planes of the inner and the outer row in the unloaded bearing."""
     speed, axial_offset = OptionalSI("rpm"), SI("mm")
 
 
@@ -376,24 +377,25 @@ class BallModel(Strict):
     """Assumptions and solver."""
 
     raceway_control: Literal["outer", "inner", "half", "hybrid", "common_cage"] = "outer"
-    """Race on which balls roll without spin. "hybrid" weighs both races by friction; "common_cage" has no gyroscopic moment."""
+    """Raceway on which balls roll without spin. "hybrid" weights both raceways by friction; "common_cage" has no gyroscopic
+    moment."""
     gyroscopic: bool | Literal["unsigned"] = True
     """Whether balls have a gyroscopic moment. "unsigned" drops its sign, as many texts do; it is negative for a rotating inner
     ring."""
     light_load_share: Annotated[float, Field(ge=1e-3, le=10.0)] = 0.3
-    """Ratio of the inner contact load to the centrifugal force at which race control is complete; below it balls move with the
-    cage. A smaller share allows several orbits of a lightly loaded ball, whose centrifugal force then changes faster than its
-    load."""
+    """Ratio of the inner contact load to the centrifugal force at which raceway control is complete; below it balls move with
+    the cage. Effect: a smaller ratio allows several orbits of a lightly loaded ball, whose centrifugal force then changes
+    faster than its load."""
     friction_limit: Annotated[float, Field(ge=1e-3, le=10.0)] = 0.3
-    """Largest friction coefficient against a ball's gyroscopic moment. The default exceeds that of any oiled or boundary contact,
-    so it acts only where no friction suffices. The ball then slips about that axis."""
+    """Largest friction coefficient against a ball's gyroscopic moment. The default exceeds the friction of any oiled or
+    boundary contact, so it acts only where no friction suffices. The ball then slips about that axis."""
     ring_expansion: bool = False
-    """Whether rings grow by rotation."""
+    """Whether rings expand by rotation."""
     ring_expansion_form: Literal["thick_ring", "paper"] = "thick_ring"
-    """Formula of the growth: that of a thick ring, or that of Hu et al. (double-decker papers) for comparison."""
+    """Formula of the ring expansion: a thick ring, or the formula of Hu et al. (double-decker papers) for comparison."""
     solver: Literal["convex", "finite_search"] = "convex"
-    """convex: guarded Newton method, which converges from any start; finite_search: the search of Hu et al. 2021,
-    for comparison."""
+    """Solver of the equilibrium. convex: guarded Newton method, which converges from any start. finite_search: the search of
+    Hu et al. 2021, for comparison."""
 
 
 class BallMaterials(Strict):
@@ -404,11 +406,11 @@ class BallMaterials(Strict):
     rings: MaterialName | CustomMaterial = "bearing_steel"
     """Material of all rings without a key of their own."""
     inner_ring: MaterialName | CustomMaterial | None = None
-    """Material of the inner ring. Default: that of rings."""
+    """Material of the inner ring. Default: as rings."""
     middle_ring: MaterialName | CustomMaterial | None = None
-    """Material of the middle ring of a double-decker bearing. Default: that of rings."""
+    """Material of the middle ring of a double-decker bearing. Default: as rings."""
     outer_ring: MaterialName | CustomMaterial | None = None
-    """Material of the outer ring. Default: that of rings."""
+    """Material of the outer ring. Default: as rings."""
 
 
 class BallScene(SceneFile):
@@ -425,15 +427,16 @@ class BallScene(SceneFile):
     materials: BallMaterials = BallMaterials()
     """Materials of balls and rings."""
     lubricant: Lubricant | None = None
-    """The oil, for film thickness and life."""
+    """Oil, for film thickness and life."""
     errors: FormErrors | None = None
-    """Form errors of grooves and balls, from which runout is computed; the equilibrium is that of the perfect bearing."""
+    """Form errors of grooves and balls, from which runout is computed. The equilibrium is computed without them."""
     mounting: Mounting | None = None
     """Fits, temperatures, shaft and housing."""
     thermal: Thermal | None = None
-    """Heat balance that computes the temperatures of a single row; without it they are those of lubricant and mounting. Needs
-    [mounting] with bore, outside and housing diameter and the width of the rings, and no temperatures of parts; and lubricant.oil_flow_l_min
-    with oil_inlet_temperature_C, or a lubricant.supply without a flow: bath, drop, oil_air or grease. rbdyn new --ambient 25 writes it all."""
+    """Heat balance that computes the temperatures of a single row; Default: temperatures are given by lubricant and mounting.
+    Needs [mounting] with bore, outside and housing diameter and the width of the rings, and without temperatures of parts.
+    Also needs lubricant.oil_flow_l_min with oil_inlet_temperature_C, or a lubricant.supply without a flow: bath, drop, oil_air
+    or grease. rbdyn new --ambient 25 writes all of this."""
 
     @model_validator(mode="before")
     @classmethod
@@ -492,7 +495,7 @@ class SingleRowScene(BallScene):
     """A scene of one row."""
 
     bearing: BallBearing
-    """The drawing of a single row."""
+    """Dimensions of a single row, as on its drawing."""
 
     def faults(self) -> Iterable[str]:
         """Faults of any ball bearing, else those of form errors."""
@@ -506,7 +509,7 @@ class DoubleDeckerScene(BallScene):
     """A scene of two concentric rows."""
 
     bearing: DoubleDecker
-    """The drawing of two rows with a ring between them."""
+    """Dimensions of two rows with a ring between them, as on their drawing."""
 
     def faults(self) -> Iterator[str]:
         """Faults of any ball bearing, else keys for a single row."""

@@ -71,8 +71,8 @@ class Bearing(Consistent):
     kind: Literal["cylindrical_roller"]
     """Kind of bearing."""
     designation: Annotated[str | None, AfterValidator(_catalogue_designation)] = None
-    """Designation in a manufacturer's catalogue, such as NU 210 or NU 210 ECP, which gives bore, outside diameter, width and series.
-    The result then compares the power loss with the friction by SKF's model. The run itself does not change."""
+    """Designation in a manufacturer's catalogue, such as NU 210 or NU 210 ECP. Effect: it gives bore, outside diameter, width
+    and series, and the result compares the power loss with SKF's friction model. The simulation does not change."""
     rollers: Annotated[int, Field(ge=2, le=500)]
     """Number of rollers."""
     roller_diameter_mm: Annotated[float, Field(ge=0.5, le=500.0)]
@@ -101,7 +101,7 @@ class Bearing(Consistent):
     tilt_direction_deg: float = 0.0
     """Direction in which the inner ring tilts, measured from the load."""
     inner_tilt_share: Fraction = 0.5
-    """Share of the tilt between roller and inner race. A roller between equal contacts tilts by half (Harris)."""
+    """Share of the tilt between roller and inner raceway. A roller between equal contacts tilts by half (Harris)."""
     roller_diameter_errors_um: list[float] | None = None
     """Deviation of each roller's diameter from the nominal one, instead of roller_diameter_spread_um."""
     roller_diameter_spread_um: Annotated[float, Field(ge=0.0, le=100.0)] = 0.0
@@ -113,9 +113,10 @@ class Bearing(Consistent):
     dynamic_capacity_N: Positive | None = None  # noqa: N815
     """Basic dynamic load rating from the catalogue. Default: calculated from the dimensions by ISO 281."""
     inner_ring_mass_kg: Annotated[float, Field(ge=LIGHTEST_RING_KG, le=1e5)] = 1.0
-    """Mass of the inner ring and of the part of the shaft that moves with it, 1 to 5 kg for a main shaft of this size. A drawing
-    gives the ring alone: 0.04 kg for the bearing of Chen et al. 2022. The share of the rotor that this bearing carries comes on
-    top. With 0.3, 1 and 3 kg that bearing has impacts of 91, 86 and 93 N and a whirl of 0.51, 0.41 and 0.55."""
+    """Mass of the inner ring and the part of the shaft that moves with it. Drawings give the ring alone (0.04 kg for the
+    bearing of Chen et al. 2022); add the share of the rotor that this bearing carries. Typical: 1 to 5 kg for a main shaft of
+    this size. Effect: 0.3, 1 and 3 kg give impact forces of 91, 86 and 93 N and whirl ratios of 0.51, 0.41 and 0.55 in that
+    bearing."""
 
     roller_diameter, pitch_diameter, radial_clearance = SI("mm"), SI("mm"), SI("mm")
     roller_length, effective_length, crown_radius = SI("mm"), SI("mm"), OptionalSI("mm")
@@ -233,26 +234,26 @@ class Cage(Consistent):
     """Cage and guide land. Clearances are diametral, and with [mounting] those of the drawing."""
 
     guidance: Literal["outer", "inner", "roller"]
-    """Guidance of the cage: by a land of the outer ring, by a land of the inner ring, or by the rollers in their pockets."""
+    """Part that guides the cage: a land of the outer ring, a land of the inner ring, or the rollers in their pockets."""
     guide_clearance_mm: Annotated[
         Annotated[float, Field(gt=0.0, le=10.0), NotVanishing] | None, Field(validate_default=True)
     ] = None
-    """Diametral clearance between cage and guide land; required where a ring guides the cage."""
+    """Diametral clearance between cage and guide land. Required if a ring guides the cage."""
     pocket_clearance_mm: Annotated[float, Field(gt=0.0, le=10.0), NotVanishing]
     """Pocket width less roller diameter."""
     mass_g: Annotated[float, Field(ge=0.01, le=1e6)]
     """Mass of the cage."""
     pocket_contact_length_mm: Positive | None = None
-    """Length of the contact between a roller and a pocket wall: the straight part of the wall less both edge breaks. It applies
-    to contact, lips and film. Default: the effective length of the roller for contact and lips, its full length for the film."""
+    """Length of the contact between a roller and a pocket wall: the straight part of the wall less both edge breaks. Default:
+    the effective length of the roller for contact and lips, its full length for the film."""
     land_diameter_mm: Positive | None = None
     """Diameter of the guide land. Default: the pitch diameter plus (outer) or minus (inner) 2/3 roller diameter, 49.5 and
     40.5 mm for the bearing of Chen et al. 2022."""
     inertia_kg_mm2: Positive | None = None
-    """Moment of inertia of the cage about its axis. Default: that of a ring from the land to the pitch diameter -+ 1/3 roller
-    diameter."""
+    """Moment of inertia of the cage about its axis. Default: calculated as a ring from the land to the pitch diameter -+ 1/3
+    roller diameter."""
     imbalance_um: Annotated[float, Field(ge=0.0, le=5000.0)] = 0.0
-    """Eccentricity of the cage's centre of mass, towards the first pocket. Usual: 0 to 100 um."""
+    """Eccentricity of the cage's centre of mass, towards the first pocket. Typical: 0 to 100 um."""
     pocket_radial_clearance_mm: Positive | None = None
     """Radial clearance between roller and pocket lips, where rollers guide the cage. Default: the pocket clearance. Without lips
     such a cage would have no radial guidance, because free rollers give way along their orbit."""
@@ -261,13 +262,13 @@ class Cage(Consistent):
     land_width_mm: Positive = 3.0
     """Width of one guide land."""
     bar_width_mm: Positive | None = None
-    """Width of a cross-bar along the circumference, at the pitch circle. The section of a window cage has four sizes: bar width,
-    bar thickness, bar length and side ring width. They give the stiffness of a bar (rbdyn/contact/cage_bar.py) unless
-    model.pocket_bar_stiffness_N_m is stated. The width does not change with cage.pocket_clearance_mm."""
+    """Width of a cage bar along the circumference, at the pitch circle. It does not change with cage.pocket_clearance_mm.
+    Effect: bar width, bar thickness, bar length and side ring width together give the stiffness of a bar
+    (rbdyn/contact/cage_bar.py), unless model.pocket_bar_stiffness_N_m is set."""
     bar_thickness_mm: Positive | None = None
-    """Radial thickness of the cross-bars and of the side rings."""
+    """Radial thickness of the cage bars and of the side rings."""
     bar_length_mm: Positive | None = None
-    """Axial length of a cross-bar and of a pocket."""
+    """Axial length of a cage bar and of a pocket."""
     side_ring_width_mm: Positive | None = None
     """Axial width of one side ring."""
 
@@ -279,10 +280,10 @@ class Cage(Consistent):
         return value
 
     hoop_modulus_share: Share = 0.65
-    """Effective hoop modulus of the cage as a share of the material's modulus, 0.5 to 0.8; 1 is a hoop without pockets. It
-    decides how far rotation widens the cage. Between the bars only the side rings carry the hoop stress, with the mass of the
-    bars as load. Side rings of a quarter to a third of the cage's width give 0.75 to 0.85, less their bending from bar to bar.
-    It acts only with [mounting]."""
+    """Effective hoop modulus of the cage as a share of the material's modulus. Typical: 0.5 to 0.8; 1 is a hoop without
+    pockets. Effect, only with [mounting]: how far rotation widens the cage. Between the bars only the side rings carry the
+    hoop stress, with the mass of the bars as load. Side rings of a quarter to a third of the cage's width give 0.75 to 0.85,
+    less their bending from bar to bar."""
 
     guide_clearance, pocket_clearance, lip_clearance = OptionalSI("mm"), SI("mm"), OptionalSI("mm")
     pocket_contact_length, land_width = OptionalSI("mm"), SI("mm")

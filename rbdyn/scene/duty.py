@@ -53,13 +53,15 @@ class DutyPoint(Consistent):
     name: Name
     """Name of the point in tables and messages."""
     share: NonNegative
-    """Share of the time; the shares of all points sum to 1. A point of share 0 counts for worst figures and limits only."""
+    """Time fraction of this point; the fractions of all points sum to 1. A point of share 0 counts only for worst values and
+    limits."""
     set: list[str] = []
-    """Overrides of the scene's keys at this point, as "key=value": operation, temperatures, oil flow; not of factors and seeds."""
+    """Keys that differ from the scene file at this point, as "key=value": operation, temperatures, oil flow; factors and seeds
+    are not allowed."""
     origin: str | None = Field(None, alias="from")
-    """State in which the machine is when this point begins: "ambient" for a cold machine, or the name of another point for its steady
-    temperatures. With it rbdyn simulate --duty and studies follow temperatures and clearances until this point is steady, by
-    [thermal.start]; without it the point is steady from the start."""
+    """State of the machine when this point begins: "ambient" for a cold machine, or the name of another point for its steady
+    temperatures. Default: this point is steady from the start. Effect: rbdyn simulate --duty and studies follow temperatures
+    and clearances until this point is steady, by [thermal.start]."""
 
     def faults(self) -> Iterator[str]:
         if ": " in self.name:

@@ -40,26 +40,26 @@ class Laws(Consistent):
     """The laws of each interaction and their parameters. A law that is off is neither computed nor compiled."""
 
     line_contact: Literal["palmgren", "iso16281", "dowson_higginson", "houpert"] = "palmgren"
-    """Law of the roller load against its approach. Palmgren's is that of Chen et al. 2022; the others agree within 7 %."""
+    """Law of roller load against approach. Chen et al. 2022 use Palmgren's; the others agree within 7 %."""
     slices: Annotated[int, Field(ge=1, le=1001)] | None = None
-    """Number of slices of a roller. Default: 1 without profile and tilt, which is exact, else 31."""
+    """Number of slices of a roller. Default: 1 without profile and tilt, which is exact, otherwise 31."""
     race_damping: Literal["viscous", "hunt_crossley", "off"] = "viscous"
-    """Damping of the race contacts: a share of critical damping, Hunt and Crossley's law, or none."""
+    """Damping of the raceway contacts: a share of critical damping, Hunt and Crossley's law, or none."""
     race_damping_ratio: Share = 0.05
     """Damping ratio, reached over race_damping_engagement_um. ADORE-style inputs have 0.05, other sources 0.1."""
     race_damping_engagement_um: Positive = 0.1
     """Approach over which viscous damping rises to its full value: about half a film thickness."""
     race_damping_alpha_s_m: Positive = 0.2
-    """Hunt and Crossley's alpha of the races, for race_damping = "hunt_crossley": 0.08 to 0.32 s/m for metals."""
+    """Hunt and Crossley's alpha of the raceways, for race_damping = "hunt_crossley". Typical: 0.08 to 0.32 s/m for metals."""
     pocket: Literal["contact", "off"] = "contact"
     """Contact between rollers and pocket walls; "off" lets rollers and cage pass through each other."""
     pocket_bar_stiffness_N_m: Positive | Literal["rigid"] = METAL_BAR_STIFFNESS  # noqa: N815
-    """Stiffness of a cross-bar, in series with the contact. Default: calculated from the section of the cage (cage.bar_width_mm
-    and the three other sizes). Without a section it is 5e7 N/m for metals, and 2.5e6 N/m for polymers (elastic modulus below
-    20 GPa), in proportion to the modulus. The value for metals lies within the published 1e7 to 1e8 N/m of metal cages. A bar
-    with clamped ends has 192 E I/L^3 (I = thickness width^3/12) under a load in its middle, and 720 E I/L^3 under an even load.
-    Its shear compliance is in series. The flexible side rings leave a quarter to a half of that. With 1e7, 5e7 and
-    2e8 N/m the bearing of Chen et al. 2022 has impacts of 47, 86 and 118 N and a whirl of 0.42, 0.41 and 0.38."""
+    """Stiffness of one cage bar, in series with the roller contact. Default: calculated from the cage section
+    (cage.bar_width_mm, bar_thickness_mm, bar_length_mm, side_ring_width_mm). Without a section: 5e7 N/m for metals (published:
+    1e7 to 1e8), 2.5e6 N/m for polymers (modulus below 20 GPa), in proportion to the modulus. Estimate: a clamped bar has 192 E
+    I/L^3 for a central load and 720 E I/L^3 for a uniform load, with I = thickness width^3/12; add the shear compliance in
+    series. Flexible side rings leave a quarter to a half of this. Effect: 1e7, 5e7 and 2e8 N/m give impact forces of 47, 86
+    and 118 N and whirl ratios of 0.42, 0.41 and 0.38 in the bearing of Chen et al. 2022."""
     pocket_damping_alpha_s_m: NonNegative | None = None
     """Hunt and Crossley's alpha of the pocket walls; 0 is undamped. Default: 0.75 s/m. The restitution is 1 - alpha v, 0.5 to
     0.7 for steel on wet bronze at 0.5 m/s."""
@@ -76,7 +76,7 @@ class Laws(Consistent):
     pocket_film_floor_um: Positive = 0.8
     """Film thickness at which the pocket wall comes into contact: the critical pocket film of ADORE-style inputs."""
     pocket_fill: Share = 1.0
-    """Share of a pocket wall covered with oil; 1 is flooded."""
+    """Share of a pocket wall that is covered with oil; 1 is flooded."""
     guide_land: Literal["film", "dry", "off"] = "film"
     """Force of the guide land on the cage: the film of a short journal bearing and dry contact, dry contact alone, or none."""
     land_film_floor_um: Positive = 3.0
@@ -92,17 +92,17 @@ class Laws(Consistent):
     land_friction: NonNegative = 0.05
     """Friction coefficient of the land's dry contact."""
     rolling_resistance: Literal["biboulet_houpert", "off"] = "biboulet_houpert"
-    """Rolling resistance of the races by the hydrodynamic inlet (Biboulet and Houpert 2010), or none."""
+    """Rolling resistance of the raceways by the hydrodynamic inlet (Biboulet and Houpert 2010), or none."""
     rolling_resistance_factor: Annotated[float, Field(gt=0.0, le=5.0), NotVanishing] = 1.0
     """Factor on the rolling resistance, in force and in power. Isothermal elastohydrodynamic solutions of one contact correspond
     to 0.97 to 1.15, with a loss of 2 F u in each contact (F is the force on one surface). SKF's rolling moments of ten catalogue
     bearings correspond to 0.5 to 1.3 (examples/published/friction_totals.py). That factor decreases with speed and viscosity
     and increases with load."""
     open_contact_film: bool = False
-    """Oil film between a race and the rollers that do not touch it: rolling resistance and shear of rigid surfaces at the gap
-    (Reynolds' equation). Without lubricant.inlet_distance it is flooded, and drives rollers and cage without any load. With it one
-    oil layer feeds loaded and open contacts: as thick as the gap where the oil of the mean loaded inner contact begins, 4 to 26 um
-    under 300 to 2000 N a contact. The film begins where the gap has that thickness, and a wider gap has none."""
+    """Oil film between a raceway and the rollers that do not touch it: rolling resistance and shear of rigid surfaces at the
+    gap (Reynolds' equation). Without lubricant.inlet_distance it is flooded, and drives rollers and cage without any load.
+    With it, one oil layer feeds loaded and open contacts. The layer fills the gap where the oil of the mean loaded inner
+    contact begins: 4 to 26 um under 300 to 2000 N per contact. A wider gap has no film."""
     drag: Literal["cylinder", "off"] = "cylinder"
     """Drag of the rollers in the mixture of oil and air, as of cylinders in cross-flow, or none."""
     drag_coefficient: NonNegative = 1.0
@@ -150,18 +150,18 @@ class Damage(Sparse):
     }
 
     impacts: bool = True
-    """Follow impacts in the pockets one by one for impacts_per_turn, impact_energy_J and impact_fatigue_force_N, which false leaves
-    out. A study follows them only where it names one of these."""
+    """Whether impacts in the pockets are followed one by one, for impacts_per_turn, impact_energy_J and
+    impact_fatigue_force_N. A study follows them only where it names one of these."""
     races: bool = True
-    """Sample the race contacts 24 times in a shaft turn for the figures of power density, flash temperature and entry, which
-    false leaves out. A study samples them only where it names one of these."""
+    """Whether the raceway contacts are sampled 24 times per shaft turn, for power density, flash temperature and entry. A
+    study samples them only where it names one of these."""
     impact_speed_m_s: Annotated[float, Field(ge=0.0, le=100.0)] = 0.01
     """Speed of the first approach above which the contact of a roller and a pocket wall is an impact."""
     fatigue_exponent: Annotated[float, Field(ge=1.0, le=20.0)] = 8.0
     """Exponent m of the S-N curve of the cage, by which impact_fatigue_force_N weighs the peak forces of impacts."""
 
     stress_concentration: Annotated[float, Field(ge=1.0, le=10.0)] = 2.0
-    """Stress at the corner of a pocket over that of a smooth bar, for bar_stress_MPa."""
+    """Stress at the corner of a pocket, relative to a smooth bar, for bar_stress_MPa."""
 
 
 class Verdict(Sparse):
@@ -169,11 +169,11 @@ class Verdict(Sparse):
     the cage, rates over its speed."""
 
     trace: bool = True
-    """Whether runs trace the orbit of the cage, 64 samples a turn, and results state its class; false leaves both out. Of a study,
-    all runs trace it where limits.cage.verdict names classes, else only those that confirm a design."""
+    """Whether runs trace the orbit of the cage, 64 samples a turn, and results state its class; false leaves both out. In a
+    study all runs trace it if limits.cage.verdict names classes, otherwise only the confirmation runs."""
     still_radius: Share = Thresholds.still_radius
-    """Rms radius of the orbit below which the cage is held. A cage is also held where the centre of its orbit is farther from that of
-    its guide than this radius."""
+    """Rms radius of the orbit below which the cage is held. A cage is also held if the centre of its orbit is farther than
+    this radius from the centre of its guide."""
     moving_radius: Share = Thresholds.moving_radius
     """Rms radius of the orbit from which a cage circles or is in fast whirl."""
     concentration: Share = Thresholds.concentration
@@ -210,24 +210,25 @@ class Numerics(Consistent, Sparse):
     scenes where stability limits explicit steps. auto: rk43 at rtol 5e-3 and above, rk45 below, unless a trial at the start of a
     run shows that rosenbrock is cheaper."""
     rtol: Annotated[float, Field(ge=1e-13, le=0.1)] = 1e-2
-    """Relative tolerance of a step: the error in approach and speed of a race contact at its mean load share. Errors at 1e-2 for
-    the bearing of Chen et al. 2022: impact -0.05 +- 0.12 %, whirl +0.1 +- 0.4 %, loss 0.000 +- 0.008 %. At 1e-1 they are -0.6,
-    -4.0 and +0.025 % (compared with rk45 at 1e-4)."""
+    """Relative tolerance of a step: the error in approach and speed of a raceway contact at its mean load share. Effect:
+    errors at 1e-2 for the bearing of Chen et al. 2022 are impact -0.05 +- 0.12 %, whirl +0.1 +- 0.4 %, loss 0.000 +- 0.008 %.
+    At 1e-1 they are -0.6, -4.0 and +0.025 % (compared with rk45 at 1e-4)."""
     turns: Annotated[float, Field(gt=0.0, le=1e6)] = 100
     """Shaft turns that are counted, after discard_turns."""
     discard_turns: Annotated[float, Field(ge=0.0, le=1e6)] | Literal["auto"] = 20.0
     """Shaft turns before the counted ones, discarded as transient; "auto" detects the transient in the series of the run, at
     least one batch."""
     extend: bool = True
-    """Double the run until its figures have settled, and count its second half: until replicates that start in two different ways
-    agree, and the later half of the counted turns with the earlier one. Whole impact windows count."""
+    """Double the run until its results have settled, and count its second half. Results have settled when replicates that
+    start in two different ways agree, and both halves of the counted turns agree. Only whole impact windows count."""
     extend_limit: Annotated[float, Field(ge=1.0, le=1000.0)] = 8.0
     """Longest run with extend, as a multiple of turns."""
     replicates: Annotated[int, Field(ge=1, le=10000)] = 8
-    """Number of runs of the scene from different starts, whose scatter gives the statistical error. Every second one starts with
-    slip, its cage near the guide and its rollers at one side of their pockets. So runs that have not settled differ."""
+    """Number of runs of the scene from different starts. Effect: their scatter gives the statistical error. Every second run
+    starts with slip, its cage near the guide and its rollers at one side of their pockets, so that runs which have not settled
+    differ."""
     seed: Annotated[int, Field(ge=0)] = 1
-    """Seed of all random starts and spreads. Equal scenes of equal seed and version give equal bits."""
+    """Seed of all random starts and deviations. Scenes with equal values, seed and version give identical results."""
     impact_window_turns: Annotated[float, Field(gt=0.0), NotVanishing] = 20
     """Window of the largest impact force, which grows with the observed time. The result is the mean over several windows."""
     samples_per_turn: Annotated[int, Field(ge=8, le=100000)] = 512
@@ -244,8 +245,8 @@ class Numerics(Consistent, Sparse):
     companion_share: Share = 0.25
     """Share of the replicates that companion repeats."""
     stiffness: bool = True
-    """Compute the stiffness by static loads after the runs: some 20 ms, nine times as long with a heat balance. A study computes it
-    only where it names one of its figures."""
+    """Compute the stiffness by static loads after the runs: some 20 ms, nine times as long with a heat balance. A study
+    computes it only if it names one of its results."""
     step_budget_per_turn: Annotated[int, Field(ge=100)] = 100_000
     """Largest number of steps in a shaft turn before a run fails, with place and reason. With 10 rollers in one slice the default takes about
     1 s a turn (8 us a step on one core). With 80 rollers in 31 slices it takes 14 s (0.14 ms a step)."""

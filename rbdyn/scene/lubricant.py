@@ -72,11 +72,11 @@ class Lubricant(Consistent, Sparse):
     UNSAVED: ClassVar[Mapping[str, Any]] = UNSAVED
 
     oil: OilName
-    """Name of the oil, or of the base oil of a grease, which decides viscosity and pressure coefficient. "data_sheet" needs
+    """Name of the oil, or of the base oil of a grease. Effect: it gives viscosity and pressure coefficient. "data_sheet" needs
     viscosities_C_mm2_s and density_kg_m3."""
     base_oil: Literal["mineral", "naphthenic", "PAO", "ester", "PAG"] | None = None
-    """Base oil of a grade or a data sheet. It gives estimates of pressure coefficient, density, heat capacity, conductivity and
-    limiting traction (rbdyn/properties/oils.py). Default: mineral."""
+    """Base oil of a grade or a data sheet. Default: mineral. Effect: it gives estimates of pressure coefficient, density, heat
+    capacity, conductivity and limiting traction (rbdyn/properties/oils.py)."""
     viscosity_index: Annotated[float, Field(ge=0.0, le=400.0)] | None = None
     """Viscosity index of a grade. Default by base oil: mineral 95, naphthenic 50, PAO and ester 140, PAG 200."""
     viscosities_C_mm2_s: Annotated[list[list[float]], Field(min_length=2, max_length=2)] | None = None  # noqa: N815
@@ -84,39 +84,41 @@ class Lubricant(Consistent, Sparse):
     density_kg_m3: Annotated[float, Field(ge=500.0, le=3000.0)] | None = None
     """Density of the oil at 15 C."""
     temperature_C: OilCelsius  # noqa: N815
-    """Temperature of the oil in the contacts. With [thermal] an optional first guess."""
+    """Temperature of the oil in the contacts. With [thermal] it is only a first guess, and optional."""
     film_temperature: Literal["oil", "parts"] = "oil"
-    """Temperature of the films. oil: all have temperature_C; parts: each has the mean temperature of its surfaces by [mounting],
-    and temperature_C is that of the oil between them, which drags the rollers. With [thermal] the films follow the parts."""
+    """Temperature of the films. oil: all films have temperature_C. parts: each film has the mean temperature of its surfaces
+    by [mounting], and only the oil between the parts, which drags the rollers, has temperature_C. With [thermal] the films
+    follow the parts."""
     viscosity_mPas: Positive | None = None  # noqa: N815
-    """Dynamic viscosity at temperature_C. Default: that of the oil."""
+    """Dynamic viscosity at temperature_C. Default: from the oil."""
     pressure_coefficient_1_GPa: Annotated[float, Field(gt=0.0, le=100.0), NotVanishing] | None = None  # noqa: N815
-    """Pressure coefficient alpha of viscosity exp(alpha p), 5 to 25 for oils. Default: that of the oil."""
+    """Pressure coefficient alpha of viscosity exp(alpha p). Typical: 5 to 25 for oils. Default: from the oil."""
     supply: Supply | None = None
-    """Lubrication method: bath, drop (drop feed), jet, oil_air or grease. It sets the starvation of SKF's friction model and
-    the documented ranges of inlet_distance and oil_fraction. It changes no law of motion."""
+    """Lubrication method: bath, drop (drop feed), jet, oil_air or grease. Effect: it sets the starvation of SKF's friction
+    model and the documented ranges of inlet_distance and oil_fraction. The simulation does not change."""
     oil_flow_l_min: Positive | None = None
-    """Flow of oil to the bearing. It gives oil_fraction, and with [thermal] it removes heat. Above D B/12 500 L/min, with
-    outside diameter and width in mm, it hardly cools further (SKF)."""
+    """Oil flow to the bearing. Effect: it gives oil_fraction, and with [thermal] it removes heat. Above D B/12 500 L/min, with
+    outside diameter and width in mm, more oil hardly cools further (SKF)."""
     oil_inlet_temperature_C: OilCelsius | None = None  # noqa: N815
-    """Temperature of the oil that flows to the bearing."""
+    """Oil inlet temperature."""
     oil_fraction: Fraction = 0.02
-    """Share of oil in the oil-air mixture around the rollers: 0.2 to 5 % for jet lubrication. Default with oil_flow_l_min: 1e5
-    W^0.37/(n d_m^1.7) of a flow of W cm3/min, at most 0.15. The formula is unverified and meant for 1 to 4 million n d_m."""
+    """Share of oil in the oil-air mixture around the rollers. Typical: 0.2 to 5 % for jet lubrication. Default with
+    oil_flow_l_min: 1e5 W^0.37/(n d_m^1.7) for a flow of W cm3/min, at most 0.15. The formula is unverified and meant for 1 to
+    4 million n d_m."""
     oil_fraction_factor: Positive = 1.0
-    """Factor on the oil fraction that follows from oil_flow_l_min."""
+    """Factor on the oil fraction calculated from oil_flow_l_min."""
     roller_roughness_um: Annotated[float, Field(gt=0.0, le=100.0), NotVanishing] = 0.05
-    """Root-mean-square roughness of the rollers, 0.03 to 0.1 for honed rollers of aircraft bearings. In the bearing of Chen et
-    al. 2022 at 100 C, 0.05 on rollers and races gives Lambda = 2.4 to 2.9, and 0.1 gives 1.2 to 1.45."""
+    """Root-mean-square roughness of the rollers. Typical: 0.03 to 0.1 for honed rollers of aircraft bearings. Effect: 0.05 on
+    rollers and raceways gives Lambda = 2.4 to 2.9 in the bearing of Chen et al. 2022 at 100 C, and 0.1 gives 1.2 to 1.45."""
     race_roughness_um: Annotated[float, Field(gt=0.0, le=100.0), NotVanishing] = 0.05
-    """Root-mean-square roughness of the races, 0.03 to 0.1 for honed races of aircraft bearings."""
+    """Root-mean-square roughness of the raceways. Typical: 0.03 to 0.1 for honed raceways of aircraft bearings."""
     inlet_distance: Positive | None = None
-    """Distance from the start of the oil to the edge of a contact, in half-widths of the contact. Default: flooded. ADORE-style
-    inputs have 10, which does not change the film and reduces the rolling resistance by 5 to 19 %. For baths, drop feed, oil-air
-    and grease 5 (2 to 10) is assumed. Over 135 points of five catalogue bearings this removes trends over oil and load compared
-    with SKF's rolling moment, which no constant factor removes. Starvation reduces film, traction and rolling resistance
-    together, so do not include SKF's starvation factor in model.rolling_resistance_factor as well. The gap there, ahead of the
-    mean loaded inner contact, is the oil layer of films at open contacts (model.open_contact_film)."""
+    """Distance from the oil meniscus to the edge of the contact, in half-widths of the contact. Default: flooded. Bath, drop
+    feed, oil-air and grease: 5 is assumed (2 to 10). Effect: it sets the starvation, which reduces film, traction and rolling
+    resistance together. Therefore do not apply SKF's starvation factor in model.rolling_resistance_factor as well. ADORE-style
+    inputs use 10: same film, 5 to 19 % less rolling resistance. At 135 points of five catalogue bearings, 5 removes trends
+    with oil and load relative to SKF's rolling moment; a constant factor cannot. With model.open_contact_film the gap at this
+    distance ahead of the mean loaded inner contact is the oil layer."""
     roller_roughness, race_roughness, oil_flow = SI("um"), SI("um"), OptionalSI("l_min")
 
     def unsaved(self) -> Mapping[str, Any]:
@@ -281,7 +283,7 @@ def fraction_faults(oil: Lubricant, pitch_mm: float, inner_rpm: float, outer_rpm
 
 
 class Traction(Consistent):
-    """Traction of the races. The defaults are an ADORE-style set for a turbine-engine oil."""
+    """Traction of the raceways. The defaults are an ADORE-style set for a turbine-engine oil."""
 
     model: Literal["four_constant", "thermal_newtonian", "eyring", "limiting_shear", "coulomb", "off"] = "four_constant"
     """Law of the traction. four_constant: one curve for all loads, as in Chen et al. 2022, which overestimates the traction of
@@ -297,7 +299,7 @@ class Traction(Consistent):
     u_m_m_s: Positive = 1.0
     """Slip at which traction is largest."""
     constants: Annotated[tuple[float, float, float, float] | None, BeforeValidator(_four_numbers)] = None
-    """A, B [s/m], C [s/m], D of (A + B u) exp(-C u) + D, instead of mu_0, mu_m, mu_inf and u_m_m_s."""
+    """Constants A, B [s/m], C [s/m], D of (A + B u) exp(-C u) + D, instead of mu_0, mu_m, mu_inf and u_m_m_s."""
     rheology_oil: RheologyOil | None = None
     """Oil of the thermal_newtonian constants of Gupta et al. 1981. Default: lubricant.oil, or MIL-L-23699 for turbine oils without
     constants."""
@@ -308,13 +310,13 @@ class Traction(Consistent):
     largest_shear_ratio: Share = 0.1
     """Largest ratio of shear stress to pressure for thermal_newtonian and eyring, whose stress is unbounded above 1.5 GPa."""
     elasticity: bool = False
-    """Tangential elasticity of the race contacts: a spring as stiff as the contact in approach acts before traction follows the
-    steady law. Contacts with a steep traction curve then need no implicit method, and most bearings of "rbdyn new" run five to
-    ten times faster. Loss, slip and whirl do not change, and impacts do not within their errors: 144.7 +- 4.3 N compared with
-    144.5 +- 2.6 N for the NU 210 at its defaults (24 and 60 replicates)."""
+    """Tangential elasticity of the raceway contacts: a spring as stiff as the contact in approach acts before traction follows
+    the steady law. Effect: contacts with a steep traction curve need no implicit method, and most bearings of "rbdyn new" run
+    five to ten times faster. Loss, slip and whirl do not change, and impacts do not within their errors: 144.7 +- 4.3 N
+    compared with 144.5 +- 2.6 N for the NU 210 at its defaults (24 and 60 replicates)."""
     friction: Literal["film", "mixed"] = "film"
-    """film: the oil film carries the whole load; mixed: asperities carry the share exp(-b Lambda^c) of the load in dry friction
-    (Zhou and Hoeprich 1991)."""
+    """Friction of loaded contacts. film: the oil film carries the whole load. mixed: asperities carry the share exp(-b
+    Lambda^c) of the load in dry friction (Zhou and Hoeprich 1991)."""
     boundary_friction: NonNegative = 0.1
     """Friction coefficient of asperities, for friction = "mixed"."""
     asperity_b: Positive = 2.32
@@ -323,7 +325,7 @@ class Traction(Consistent):
     asperity_c: Positive = 0.97
     """Constant c of the asperities' share exp(-b Lambda^c), from the same source."""
     coulomb: NonNegative = 0.1
-    """Friction coefficient of dry races, for model = "coulomb"."""
+    """Friction coefficient of dry raceways, for model = "coulomb"."""
     blend_speed_m_s: Positive = 0.02
     """Slip over which the friction force changes sign smoothly instead of a jump."""
     eyring_stress = SI("MPa")

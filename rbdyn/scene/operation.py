@@ -151,9 +151,9 @@ class BallOperation(Consistent):
     moment_Nm: Annotated[list[Moment], Field(min_length=2, max_length=2)] | None = None  # noqa: N815
     """Moments about x and y."""
     tilt: Literal["free", "fixed"] = "fixed"
-    """fixed: the shaft keeps the ring at operation.prescribed.tilt_x_mrad and tilt_y_mrad (default 0), like a shaft in two
-    bearings; free: the ring tilts with the load. A free 7208 under 1000 N radial and 1500 N axial tilts by 3 mrad, which halves
-    its life."""
+    """Whether the inner ring can tilt. fixed: the shaft keeps it at operation.prescribed.tilt_x_mrad and tilt_y_mrad (default
+    0), like a shaft in two bearings. free: it tilts with the load. Effect: a free 7208 under 1000 N radial and 1500 N axial
+    tilts by 3 mrad, which halves its life."""
     prescribed: Prescribed = Prescribed()
     """Prescribed displacements of the inner ring instead of loads."""
     preload_N: Force = 0.0  # noqa: N815
@@ -264,7 +264,7 @@ class Mounting(Consistent, Sparse):
     outside_diameter_mm: Positive
     """Outside diameter of the outer ring."""
     width_mm: Positive | None = None
-    """Width of the rings, through whose seats [thermal] removes heat. Default: that of bearing.designation."""
+    """Width of the rings, through whose seats [thermal] removes heat. Default: from bearing.designation."""
     shaft_bore_mm: NonNegative = 0.0
     """Bore of the shaft; 0 is a solid shaft."""
     housing_diameter_mm: Positive
@@ -282,12 +282,12 @@ class Mounting(Consistent, Sparse):
     roller_temperature_C: Celsius | None = None  # noqa: N815
     """Temperature of rollers or balls. Default: the mean of the rings."""
     cage_temperature_C: Celsius | None = None  # noqa: N815
-    """Temperature of the cage of a roller bearing. Default: the mean of the rollers and the guiding ring, or that of the rollers
-    where they guide it."""
+    """Temperature of the cage of a roller bearing. Default: the mean of the rollers and the guiding ring, or the temperature
+    of the rollers where they guide it."""
     shaft_temperature_C: Celsius | None = None  # noqa: N815
-    """Temperature of the shaft. Default: that of the inner ring."""
+    """Temperature of the shaft. Default: as the inner ring."""
     housing_temperature_C: Celsius | None = None  # noqa: N815
-    """Temperature of the housing. Default: that of the outer ring."""
+    """Temperature of the housing. Default: as the outer ring."""
     shaft_material: MaterialName | CustomMaterial = "bearing_steel"
     """Material of the shaft."""
     housing_material: MaterialName | CustomMaterial = "bearing_steel"

@@ -31,8 +31,8 @@ class StartSchedule(Consistent):
     time_s: Annotated[list[NonNegative], Field(min_length=1, max_length=MOST_POINTS)]
     """Times of the points from the start of the machine, the first 0."""
     speed_rpm: list[Pace] | None = None
-    """Speed at each time, without a sign: that of the inner ring, or of the outer one where the inner ring stands still; the other
-    ring keeps the ratio of [operation]. Default: the speed of [operation]."""
+    """Speed of the inner ring at each time, without a sign. Where the inner ring is at rest it is the speed of the outer ring.
+    The other ring keeps the ratio of [operation]. Default: the speed of [operation]."""
     load_N: list[Load] | None = None  # noqa: N815
     """Radial load at each time. Default: the load of [operation]."""
     speed = InSI[list[float] | None]("rpm")
@@ -70,8 +70,8 @@ class Start(Strict):
     from_C: OilCelsius | None = None  # noqa: N815
     """Temperature of all parts and of the oil at the start. Default: thermal.ambient_C."""
     from_parts_C: Annotated[list[OilCelsius], Field(min_length=6, max_length=6)] | None = None  # noqa: N815
-    """Temperatures of oil, outer ring, inner ring, rollers, housing and shaft at the start, such as those of another operating point;
-    instead of from_C."""
+    """Temperatures of oil, outer ring, inner ring, rollers, housing and shaft at the start, such as the temperatures of
+    another operating point; instead of from_C."""
     from_point: dict[str, Any] | None = None
     """Keys of the scene with their values at another operating point, such as {"operation.inner_speed_rpm" = 800}: the machine begins
     with the steady temperatures of that point, instead of from_C."""

@@ -53,8 +53,8 @@ class Thermal(Sparse):
     ambient_C: OilCelsius = 20.0  # noqa: N815
     """Temperature around housing and shaft; ISO 15312 has 20."""
     surface_factor: Positive = 1.0
-    """Factor on the heat transfer from all surfaces in the bearing to the oil, which is that of a flat plate in pure oil.
-    Formulas for the cavity of a bearing differ by a factor of ten: adjust it to one measured temperature."""
+    """Factor on the heat transfer from all surfaces in the bearing to the oil, which is calculated as for a flat plate in pure
+    oil. Formulas for the cavity of a bearing differ by a factor of ten: adjust it to one measured temperature."""
     housing_factor: NonNegative = 1.0
     """Factor on the heat that the housing removes, 0.016 W/mm2 of its seat at 50 K above ambient as in ISO 15312. A
     plummer block in moving air removes more, a hot housing nothing (0)."""
@@ -62,20 +62,21 @@ class Thermal(Sparse):
     """Factor on the heat that the shaft removes, 0.016 W/mm2 of its seat at 50 K above ambient as in ISO 15312. Shafts have less
     surface than housings and remove 0.2 to 1 of that; a shaft as hot as the inner ring removes nothing (0)."""
     sump_factor: NonNegative = 1.0
-    """Factor on the heat that the oil of a bath loses through the walls of the housing: 150 W/m2K of the seat
-    of the outer ring. It counts with lubricant.supply = "bath" only."""
+    """Factor on the heat that bath oil loses through the housing walls: 150 W/m2K, based on the outer-ring seat. It counts
+    with lubricant.supply = "bath" only."""
     film_share_to_oil: Annotated[float, Field(ge=0.0, le=1.0)] = 0.3
     """Share of the heat of films and of rolling resistance that the oil takes along; both surfaces get the rest in halves. Oil passes
     a contact in 1e-5 s, and heat is conducted to the walls in 1e-7 s, so little stays in the oil."""
     contact_factor: Positive = 1.0
-    """Factor on the heat conducted through the race contacts, which follows from conductivity and heat capacity of the parts."""
+    """Factor on the heat conducted through the raceway contacts, which follows from conductivity and heat capacity of the
+    parts."""
     oil_share: Share = 1.0
     """Share of lubricant.oil_flow_l_min that enters the bearing. The outer ring of a 35 mm bearing with jets stayed within 12 K
     of what the whole flow would have (NASA TP-2275)."""
     shaft_lag: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.125
     """Share of the inner ring's rise above ambient by which the shaft stays below the ring: 0.10 to 0.15 (NSK)."""
     cage_offset_K: Annotated[float, Field(ge=-100.0, le=100.0)] = 0.0  # noqa: N815
-    """Temperature of the cage above that of the rolling elements."""
+    """Temperature difference between cage and rolling elements."""
     oil_ceiling_C: OilCelsius | None = None  # noqa: N815
     """Highest temperature of the oil. Default by base oil: mineral 120, PAO and PAG 150, ester 200."""
     cage_ceiling_C: Annotated[float, Field(ge=-60.0, le=1000.0)] | None = None  # noqa: N815

@@ -154,8 +154,8 @@ class Uncertain(Strict):
     __pydantic_extra__: dict[str, Law] = Field(init=False)
 
     defaults: Literal["documented", "none"] = "documented"
-    """documented: keys at their default, or named in estimated, vary over their documented range where their law is active
-    (rbdyn keys lists the ranges); none: only keys with a law here, or named in estimated, vary."""
+    """Keys that vary in addition to those with a distribution here or named in estimated. documented: keys at their default,
+    over the range that rbdyn keys lists, where their law is active. none: no other key."""
     estimated: list[str] = []
     """Keys of the scene whose stated values are estimates. They vary over their documented range, also with defaults = "none".
     bearing.roller_diameter_mm and bearing.pitch_diameter_mm do not vary: named here, they mark the parts that follow from them."""
@@ -164,11 +164,12 @@ class Uncertain(Strict):
     seed: Annotated[int, Field(ge=0)] = 1
     """Seed of the input sets."""
     inputs: Annotated[int, Field(ge=1, le=30)] = 12
-    """Largest number of inputs of an emulator: all declared ones, and those with the largest main effects. Every unknown input
-    varies in every input set; the effects of the others count as scatter. doe calibrate estimates at most this number."""
+    """Largest number of inputs of an emulator: all declared inputs, and those with the largest main effects. Every unknown
+    input varies in every input set; the effects of inputs without an emulator count as scatter. doe calibrate estimates at
+    most this number."""
     set: list[str] = list(RUNS)
-    """Keys of the scene that differ in the runs of input sets, as key=value. A list replaces these keys of the default and leaves
-    its others. A key in the list is fixed: it has neither a law nor a documented range."""
+    """Keys that differ from the scene file in the runs of input sets, as key=value. Your list replaces these keys and keeps
+    the other defaults. A key in this list is fixed: it has no distribution and no documented range."""
     sample: str | None = None
     """CSV file of a posterior sample, one row for each input set, with keys as columns, which replaces the laws of these keys. The
     path is relative to the folder of this file."""

@@ -23,9 +23,8 @@ ROLLERS = ("own", "--rollers", "16", "--roller", "7x7", "--pitch", "60")
 BALLS = ("own", "--balls", "16", "--ball", "9.525", "--pitch", "65", "--contact-angle", "25")
 POINT = ("--speed", "3000", "--load", "2000")
 OIL = (
-    "--oil castor: is no oil known here; write ISO VG 10, 15, 22, 32, 46, 68, 100, 150, 220, 320 or 460, with mineral, naphthenic, PAO, "
-    "ester, PAG behind it and grease before it as needed, or 7808, 23699, 85734, Jet Oil II; own data go into [lubricant] as oil = "
-    "'data_sheet'"
+    "--oil castor: is not a known oil; write ISO VG 10, 15, 22, 32, 46, 68, 100, 150, 220, 320 or 460 (with grease before it, "
+    "mineral, naphthenic, PAO, ester, PAG behind it), 7808, 23699, 85734 or Jet Oil II. Own data: oil = 'data_sheet' in [lubricant]"
 )
 QUICK = ("turns=3", "discard_turns=2", "replicates=2", "impact_window_turns=1", "companion=false", "extend=false")
 SET = [part for assignment in QUICK for part in ("--set", f"numerics.{assignment}")]

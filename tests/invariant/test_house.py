@@ -16,7 +16,7 @@ SOURCES = [path for package in ("rbdyn", "doe") for path in (ROOT / package).rgl
 LONGEST_FILE, LONGEST_FUNCTION, MOST_AT_THE_ROOT = 600, 70, 6
 # Lines of code of both packages. A change may lower this freely. Raise it only with the feature that needs it, and say by
 # how much in the commit.
-MOST_CODE = 49_410
+MOST_CODE = 49_400
 TOP = {
     ".ci",
     ".gitignore",
@@ -295,8 +295,8 @@ def _without_code(page: str) -> str:
 
 
 # Words of a sentence that a reader takes in at once; where a sentence ends; and what is no sentence.
-LONGEST_SENTENCE = 25
-SENTENCE_END = re.compile(r"(?<=[.!?:;])\s+|\n\s*\n|\n\s*[-*] ")
+LONGEST_SENTENCE = 30
+SENTENCE_END = re.compile(r"(?<=[.!?])\s+|\n\s*\n|\n\s*[-*] ")
 SQL = re.compile(r"\s*(?:SELECT|INSERT|UPDATE|DELETE|CREATE|PRAGMA|WITH)\b")
 
 
@@ -332,10 +332,10 @@ def _long_sentences(text: str) -> list[str]:
 
 
 def test_invariant_messages_are_short_sentences():
-    """Invariant: no sentence of a message, label, note or description of a key has more than 25 words; SQL is exempt."""
+    """Invariant: no sentence of a message, label, note or description of a key has more than 30 words, and no colon or semicolon ends one; SQL is exempt."""
     assert (
-        _long_sentences("a word " * 13)
-        and not _long_sentences("a word 1 - " * 12)
+        _long_sentences("a word; " * 16)
+        and not _long_sentences("a word 1 - " * 15)
         and not _long_sentences("SELECT a " * 20)
     )
     read, long = 0, []

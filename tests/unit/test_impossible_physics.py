@@ -129,7 +129,7 @@ def test_unit_heat_that_no_oil_carries_off(outer):
     limit = 3.3 * 2.0 * math.pi * 43.5 * 5.0
     assert heat_notes(outer, 0.99 * limit) == ()
     (note,) = heat_notes(outer, 1.01 * limit)
-    assert note.code == "heat" and "no bearing sheds them" in note and f"{1.01 * limit / 2700.0:.2g} L/min" in note
+    assert note.code == "heat" and "which is not realistic" in note and f"{1.01 * limit / 2700.0:.2g} L/min" in note
     assert "lubricant.temperature_C = 100" in note
 
 

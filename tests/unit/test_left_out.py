@@ -90,9 +90,9 @@ def test_unit_notes_only_where_it_matters(outer, make_scene):
     # Without any loss there is no share.
     assert left_out_notes(outer, 0.0) == ()
     tilted = left_out_notes(make_scene("bearing.tilt_mrad=0.4"), 1e4)
-    assert [note.split(";")[0] for note in tilted] == [
-        "left out: skew of rollers",
-        "left out: contact of roller ends and flanges",
+    assert [note.split(". Effect")[0] for note in tilted] == [
+        "not modelled: skew of rollers",
+        "not modelled: contact of roller ends and flanges",
     ]
     (soft,) = left_out_notes(make_scene("materials.cage=peek"), 1e4)
     assert "elastic deformation of the cage ring" in soft
@@ -105,4 +105,4 @@ def test_unit_notes_only_where_it_matters(outer, make_scene):
 
 def test_unit_result_carries_the_notes(outer_result):
     """Unit: a result says what its own power loss makes noticeable."""
-    assert any("left out: windage" in note for note in outer_result.notes)
+    assert any("not modelled: windage" in note for note in outer_result.notes)

@@ -189,7 +189,7 @@ def test_the_corners_say_before_the_design_ends_what_is_likely(bound, unlikely, 
     assert plan.startswith("22 to 27 runs (baseline 1, design runs 20, ") and said[plan] == 0
     assert original.startswith("original design: impact force ") and said[original] == 1
     assert missed.startswith(f"the original misses impact force <= {bound:g} N by ") and said[missed] == 1
-    likely = [sentence for sentence in others if sentence.startswith("likely no point keeps impact force <= 5 N: ")]
+    likely = [sentence for sentence in others if sentence.startswith("likely no point meets impact force <= 5 N: ")]
     assert len(likely) == unlikely and all(8 < said[sentence] < 21 for sentence in likely)
 
 

@@ -273,11 +273,11 @@ def test_unit_a_run_that_drifts_goes_on(example):
     assert [len(run.durations) for run in steady.companions] == [60] and not steady.notes
     slow = settled_run(example, lambda turns: 0.5 * np.minimum(turns, 100))
     assert {(len(run.durations), run.first) for run in (*slow.runs, *slow.companions)} == {(240, 120)}
-    assert "240 shaft turns per replicate instead of 60; the last 120 are counted" in slow.notes[0]
+    assert "extended from 60 to 240 shaft turns. The last 120 count." in slow.notes[0]
     assert slow.since == 20
     endless = settled_run(example, lambda turns: 0.1 * turns)
     assert {(len(run.durations), run.first) for run in endless.runs} == {(480, 240)}
-    assert "still drift over the 240 turns" in endless.notes[1] and "numerics.extend_limit" in endless.notes[1]
+    assert "still drift over the 240 counted turns" in endless.notes[1] and "numerics.extend_limit" in endless.notes[1]
 
 
 def test_unit_lengthening_is_bounded_and_can_be_forbidden(example, monkeypatch):
@@ -293,7 +293,7 @@ def test_unit_lengthening_is_bounded_and_can_be_forbidden(example, monkeypatch):
     full = settled_run(example, ramp)
     assert {len(run.durations) for run in (*full.runs, *full.companions)} == {120}
     assert "still drift" in full.notes[1] and full.notes[1].endswith(
-        "take fewer replicates: there is no memory for longer ones"
+        "Take fewer replicates: there is not enough memory for longer ones"
     )
     monkeypatch.undo()
     fixed = example.model_copy(update={"numerics": example.numerics.model_copy(update={"extend": False})})

@@ -131,7 +131,9 @@ def test_a_surface_that_misses_more_than_the_known_variance_says_so():
     bent = 10 + 3 * np.sin(2 * POINTS[:, 0]) + noise(9, deviation=0.05)
     surface = surface_of(bent, standard_errors=np.full(20, 0.05))
     assert surface.known_variance.p < 1e-6
-    assert "against pure error, p < 0.0001 against the known variance): the error" in sentence(surface, "lack of fit")
+    assert "against pure error, p < 0.0001 against the known variance): the surface error" in sentence(
+        surface, "lack of fit"
+    )
     assert "agree" in sentence(surface, "repeated runs")
 
 
@@ -141,7 +143,7 @@ def test_one_sentence_judges_lack_of_fit_where_two_tests_disagree():
     values[-6:] = 10 + 0.5 * (values[-6:] - 10)
     surface = surface_of(values, standard_errors=np.full(20, 1.0), model="linear")
     assert surface.lack_of_fit.p < 0.05 < surface.known_variance.p and not surface.known_variance.refuted
-    assert "is in doubt, for the tests disagree" in sentence(surface, "lack of fit")
+    assert "is in doubt, because the tests disagree" in sentence(surface, "lack of fit")
     assert not any("explains the residual" in line for line in describe(surface))
 
 

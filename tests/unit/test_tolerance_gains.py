@@ -137,11 +137,8 @@ def test_unit_warning_names_the_gain_and_the_width_without_it(planes):
     assert found.warning.startswith(
         "The gain of power loss requires parts finer than IT4: radial clearance within ± 0.0"
     )
-    assert (
-        f"({record.grade})" in found.warning
-        and "Without the gain of power loss the tolerance would be" in found.warning
-    )
-    assert "power loss 0." in found.warning.partition("in 95 % of the parts: ")[2]
+    assert f"({record.grade})" in found.warning and "Without this requirement the tolerance could be" in found.warning
+    assert "power loss 0." in found.warning.partition("95 % of the parts have ")[2]
     assert "finer than IT1:" in widest(planes, gains=[LOSS], at_least={LOSS: 0.59}, finest_grade=1).warning
 
 

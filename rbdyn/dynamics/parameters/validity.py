@@ -65,9 +65,8 @@ def race_notes(scene: Scene, races: Mapping[str, Mapping[str, float]]) -> Notes:
     thinnest = min(films, key=films.__getitem__, default=None)
     if thinnest and films[thinnest] < FULL_FILM and law.friction == "film" and law.model not in ("coulomb", "off"):
         sentence = (
-            f"film: lambda is {films[thinnest]:.2g} on the {thinnest} race, below {FULL_FILM:g}, so asperities touch while the "
-            "friction is that of a full film; set traction.friction = 'mixed', or check lubricant.temperature_C and the "
-            "roughnesses"
+            f"film: lambda is {films[thinnest]:.2g} on the {thinnest} raceway, below {FULL_FILM:g}, so asperities touch but only film "
+            "friction counts. Set traction.friction = 'mixed', or check lubricant.temperature_C and the roughnesses"
         )
         notes.append(Note("thin-film", sentence))
     return tuple(notes)
@@ -250,7 +249,7 @@ LEFT_OUT = (
     ),
     LeftOut(
         "skew of rollers",
-        "axial sliding in the races and forces on the cage off its middle plane",
+        "axial sliding in the raceways and forces on the cage outside its middle plane",
         "none: it needs motion out of the plane; tilted rings cause it",
         matters=lambda scene: scene.bearing.tilt != 0.0,
     ),
@@ -277,12 +276,12 @@ def left_out_notes(scene: Scene, power_loss: float) -> Notes:
             power = item.power(scene)
             if power > NOTED_SHARE * power_loss > 0.0:
                 share = power / power_loss
-                size = f"{100.0 * share:.2g} % of" if share < 1.0 else f"{share:.2g} times as much as"
+                size = f"{100.0 * share:.2g} %" if share < 1.0 else f"{share:.2g} times the simulated loss"
                 code = "omission" if share > LARGE_SHARE else "left-out"
-                sentence = f"left out: {item.name}, estimated at {power:.2g} W ({size} the power loss); {item.changes}"
+                sentence = f"not modelled: {item.name}. Effect: about {power:.2g} W ({size}) {item.changes}"
                 notes.append(Note(code, sentence))
         elif item.matters is not None and item.matters(scene):
-            notes.append(Note("left-out", f"left out: {item.name}; {item.changes}"))
+            notes.append(Note("left-out", f"not modelled: {item.name}. Effect: {item.changes}"))
     return tuple(notes)
 
 
@@ -322,8 +321,8 @@ def light_load_notes(scene: Scene) -> Notes:
     rising = sorted(rules.items(), key=lambda item: item[1])
     loads = ", ".join(f"{1e-3 * least:.2g} kN ({rule})" for rule, least in rising)
     sentence = (
-        f"load: {load:.4g} N is below {missed} of {len(rules)} manufacturers' minimum loads against skidding: {loads}; no rule is "
-        "safe; see cage_slip"
+        f"load: {load:.4g} N is below {missed} of {len(rules)} manufacturers' minimum loads against skidding: {loads}. "
+        "Rollers may skid, but these rules are not reliable: check cage_slip"
     )
     return (Note("light-load", sentence),)
 
@@ -335,19 +334,19 @@ def film_drive_notes(scene: Scene) -> Notes:
         return ()
     limit = f"{100.0 * FILM_DRIVEN:g} % of C = {1e-3 * capacity:.3g} kN"
     if scene.model.open_contact_film:
-        films = "are flooded, for lubricant.inlet_distance is left out"
+        films = "are flooded, because lubricant.inlet_distance is not set"
         if scene.lubricant.inlet_distance is not None:
             layer = oil_layer(scene)
             films = f"fill gaps up to {1e6 * layer:.2g} um, as lubricant.inlet_distance and the load set it"
             films = (
                 films
                 if layer > 0.0
-                else "are missing, for no loaded inner contact feeds them by lubricant.inlet_distance"
+                else "are missing, because no loaded inner contact feeds them by lubricant.inlet_distance"
             )
-        films = f"which at open contacts {films}; compare it over the range of that key"
+        films = f"films at open contacts {films}. Compare results over the range of that key"
     else:
-        films = "of which those at open inner contacts are left out; set model.open_contact_film = true"
-    sentence = f"load: {load:.4g} N is below {limit}, so cage slip rests on the drag of oil films, {films}"
+        films = "films at unloaded inner contacts are off. Set model.open_contact_film = true"
+    sentence = f"load: {load:.4g} N is below {limit}. At such loads oil films drive the cage, and {films}"
     return (Note("oil-drag", sentence),)
 
 
@@ -376,8 +375,8 @@ def heat_notes(scene: Scene, power_loss: float) -> Notes:
     if heat <= TOO_HOT * JET_COOLED:
         return ()
     sentence = (
-        f"heat: a power loss of {power_loss:.3g} W is {heat / JET_COOLED:.2g} times the heat that a jet has removed from such a surface; it takes "
-        f"{power_loss / OIL_HEAT:.2g} L/min of oil that warms by 100 K: no bearing sheds them; check the speed and "
-        f"lubricant.temperature_C = {oil.temperature_C:g}, at which the oil has {1e3 * oil.in_service.viscosity:.3g} mPa s"
+        f"heat: a power loss of {power_loss:.3g} W is {heat / JET_COOLED:.2g} times the heat that a jet has removed from such a surface. "
+        f"Removing it needs {power_loss / OIL_HEAT:.2g} L/min of oil that warms by 100 K, which is not realistic. Check the speed and "
+        f"lubricant.temperature_C = {oil.temperature_C:g} (oil viscosity {1e3 * oil.in_service.viscosity:.3g} mPa s)"
     )
     return (Note("heat", sentence),)

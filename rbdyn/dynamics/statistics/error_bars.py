@@ -318,8 +318,8 @@ def error_notes(
     if few:
         listed = ", ".join(f"{JUDGED[name]} {count:.1f}" for name, count in few.items())
         sentence = (
-            f"statistical error: uncertain because of fewer than {FEW_SAMPLES:.0f} effective samples ({listed}); "
-            "raise numerics.turns or numerics.replicates"
+            f"statistical error: uncertain because of fewer than {FEW_SAMPLES:.0f} effective samples ({listed}). "
+            "Raise numerics.turns or numerics.replicates"
         )
         notes.append(Note("few-samples", sentence))
     return notes + [note for name in JUDGED if (note := _numerical_note(scene, JUDGED[name], figures[name], tighter))]

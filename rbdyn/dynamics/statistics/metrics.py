@@ -103,10 +103,10 @@ def whirl_notes(scene: Scene, share: Quantity | None) -> Notes:
     play = scene.cage_play_m
     if share is None or play is None or share.value >= JITTER:
         return ()
-    clearance = "radial play in its pockets" if scene.guide_clearance_m is None else "radial guide clearance"
+    clearance = "radial clearance in its pockets" if scene.guide_clearance_m is None else "radial guide clearance"
     sentence = (
-        "whirl deviation ratio: the cage does not whirl, so the ratio has little meaning; its orbit has a radius of "
-        f"{1e6 * play * share.value:.2g} um, {share.value:.2g} of the {clearance}"
+        f"whirl deviation ratio: the cage does not whirl. Its orbit radius is {1e6 * play * share.value:.2g} um, {share.value:.2g} of "
+        f"the {clearance}, so the ratio has little meaning"
     )
     return (Note("jitter", sentence),)
 
