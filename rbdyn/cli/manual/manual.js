@@ -1,4 +1,4 @@
-// Contents fold by themselves on a narrow screen; the search lists headings whose text holds all words typed.
+// Contents fold by themselves on a narrow screen; the search lists headings whose text holds all words typed, folded modules last.
 "use strict";
 (() => {
   const box = document.getElementById("search"), found = document.getElementById("found");
@@ -6,14 +6,18 @@
   const MOST = 40;
   let blocks = null;
 
-  // Text from each heading to the next one, and the chapter that it stands in.
+  // Elements of a chapter in order, those of folded modules as well.
+  const flat = each => ["DETAILS", "SUMMARY"].includes(each.tagName) ? [...each.children].flatMap(flat) : [each];
+
+  // Text from each heading to the next one, its chapter, and whether it is folded.
   function read() {
     const all = [];
     for (const section of document.querySelectorAll("main section")) {
       let block = null;
-      for (const each of section.children) {
+      for (const each of [...section.children].flatMap(flat)) {
         if (/^H[2-5]$/.test(each.tagName)) {
-          block = { id: each.id, title: each.textContent, chapter: section.firstElementChild.textContent, text: "" };
+          const chapter = section.firstElementChild.textContent, folded = Boolean(each.closest("details"));
+          block = { id: each.id, title: each.textContent, chapter, folded, text: "" };
           all.push(block);
         }
         block.text += " " + each.textContent.toLowerCase();
@@ -31,7 +35,8 @@
     blocks ??= read();
     const holds = text => words.every(word => text.includes(word));
     const hits = blocks.filter(block => holds(block.text));
-    hits.sort((one, other) => holds(other.title.toLowerCase()) - holds(one.title.toLowerCase()));
+    const late = hit => 2 * hit.folded - holds(hit.title.toLowerCase());
+    hits.sort((one, other) => late(one) - late(other));
     count.textContent = hits.length > MOST ? `${MOST} of ${hits.length} places` : `${hits.length} places`;
     for (const hit of hits.slice(0, MOST)) {
       const item = document.createElement("li"), link = document.createElement("a"), where = document.createElement("small");

@@ -14,7 +14,6 @@ from markdown_it import MarkdownIt
 from markdown_it.renderer import RendererProtocol
 from markdown_it.token import Token
 
-from rbdyn.base.notes import CODES
 from rbdyn.base.words import filled_page
 from rbdyn.cli.manual.drawings import roller_bearing
 from rbdyn.plots.sketches import Sketch
@@ -157,6 +156,9 @@ def _members(trees: Trees, module: str, node: Named) -> Iterator[str]:
 
 
 OPTION = re.compile(r"(?<!\S)(--?[a-z][\w-]*)")
+# Divisions of the manual by the number of their first file, and chapters whose modules are folded.
+DIVISIONS = {"10": "Start", "20": "Tutorials", "30": "How-to guides", "50": "Explanation", "60": "Reference"}
+FOLDED = ("equations", "library")
 # Headings deeper than this are on the page and in the search, not in the contents.
 DEEPEST = 3
 
@@ -171,26 +173,32 @@ class Heading(NamedTuple):
 
 def page(parts: Sequence[Part]) -> str:
     """The manual of these parts as one HTML page, the same bytes each time."""
-    contents, sections = [], []
     scene = roller_bearing()
     sketches = {name: sketch for part in parts for name, sketch in part.drawings(scene).items()}
-    for name, text in chapters(parts):
-        headings, html = rendered(text, name, sketches)
-        contents.append(_entry(headings))
-        sections.append(f'<section aria-labelledby="{name}">\n{html}</section>')
+    made = [(division, name, *rendered(text, name, sketches)) for division, name, text in chapters(parts)]
+    contents: dict[str, list[str]] = {division: [] for division in DIVISIONS.values()}
+    sections = []
+    for division, name, headings, html in made:
+        contents[division].append(_entry(headings))
+        sections.append(f'<section aria-labelledby="{name}">\n{folded(html) if name in FOLDED else html}</section>')
+    # A title in quotation marks is a link to its chapter.
+    titles = {f"&quot;{headings[0].html}&quot;": headings[0].key for _, _, headings, _ in made}
+    quoted = re.compile("|".join(map(re.escape, titles)))
     here = Path(__file__)
     marks = {
         "VERSION": escape(version("rbdyn")),
         "STYLE": here.with_name("manual.css").read_text(encoding="utf-8"),
         "SCRIPT": here.with_name("manual.js").read_text(encoding="utf-8"),
-        "CONTENTS": "\n".join(contents),
-        "SECTIONS": "\n".join(sections),
+        "CONTENTS": "\n".join(
+            f"<li><strong>{division}</strong><ol>{''.join(entries)}</ol></li>" for division, entries in contents.items()
+        ),
+        "SECTIONS": quoted.sub(lambda each: f'<a href="#{titles[each[0]]}">{each[0]}</a>', "\n".join(sections)),
     }
     return filled_page(here.with_name("manual.html").read_text(encoding="utf-8"), marks)
 
 
-def chapters(parts: Sequence[Part]) -> Iterator[tuple[str, str]]:
-    """Name and Markdown of each chapter, in the order of the file names; some continue with generated text."""
+def chapters(parts: Sequence[Part]) -> Iterator[tuple[str, str, str]]:
+    """Division, name and Markdown of each chapter, in the order of the file names; some continue with generated text."""
     trees = trees_of(part.package for part in parts)
     generated = {
         "keys": keys_of,
@@ -198,12 +206,12 @@ def chapters(parts: Sequence[Part]) -> Iterator[tuple[str, str]]:
         "equations": lambda part: equations(trees, part.package),
         "library": lambda part: library(trees, part.package),
         "tables": tables_of,
-        "notes": lambda part: [code_table()] if part is parts[0] else [],
     }
     for path in sorted((path for part in parts for path in part.prose.glob("*.md")), key=lambda path: path.name):
-        name = path.stem.partition("_")[2]
+        number, _, name = path.stem.partition("_")
+        division = DIVISIONS[max(first for first in DIVISIONS if first <= number)]
         more = (block for part in parts for block in generated[name](part)) if name in generated else ()
-        yield name, "\n\n".join((path.read_text(encoding="utf-8"), *more))
+        yield division, name, "\n\n".join((path.read_text(encoding="utf-8"), *more))
 
 
 def tables_of(part: Part) -> Iterator[str]:
@@ -211,15 +219,6 @@ def tables_of(part: Part) -> Iterator[str]:
     for heading, sheets in part.tables().items():
         yield f"## {heading}"
         yield from (sheet.manual for sheet in sheets)
-
-
-def code_table() -> str:
-    """Every code of a note with its level and meaning."""
-    rows = (
-        f"| `{name}` | {code.level}{', general' if code.general else ''} | {code.meaning} |"
-        for name, code in CODES.items()
-    )
-    return "\n".join(("| code | level | meaning |", "|---|---|---|", *rows))
 
 
 def rendered(text: str, chapter: str, sketches: Mapping[str, Sketch] | None = None) -> tuple[list[Heading], str]:
@@ -249,6 +248,13 @@ def rendered(text: str, chapter: str, sketches: Mapping[str, Sketch] | None = No
     html = html.replace("<p><figure>", "<figure>").replace("</figure></p>", "</figure>")
     # A table may be wider than a narrow screen.
     return headings, html.replace("<table>", '<div class="scroll"><table>').replace("</table>", "</table></div>")
+
+
+def folded(html: str) -> str:
+    """The HTML of a chapter with each module folded: its heading is the summary, which opens the rest."""
+    pieces = re.split(r"(?=<h[34] )", html)
+    opened = (re.sub(r"(<h4 .*?</h4>)", r"<summary>\1</summary>", piece, count=1) for piece in pieces)
+    return "".join(f"<details>{piece}</details>" if piece.startswith("<summary>") else piece for piece in opened)
 
 
 def _code(renderer: RendererProtocol, tokens: Sequence[Token], place: int, *_: Any) -> str:
