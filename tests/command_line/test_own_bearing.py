@@ -61,13 +61,13 @@ def test_own_bearing_runs_as_told(tmp_path, chapter):
             assert whole.count(text.replace("upper = 135.0\n", "")) == 1
             study.write_text(whole.replace(text.replace("upper = 135.0\n", ""), text), encoding="utf-8")
         else:
-            lines = dict(map(told, printed.splitlines()))
+            lines = list(map(told, printed.splitlines()))
             for line in text.splitlines():
                 words, numbers = told(line)
-                assert len(lines[words]) == len(numbers), line
                 # The front is flat in some clearances, where another machine may pick others: its verdicts are words.
                 sure = numbers if program == "rbdyn" else numbers[: 2 if "≤" in line else 1]
-                assert all(map(agrees, lines[words], sure)), line
+                alike = [found for same, found in lines if same == words]
+                assert any(all(map(agrees, found, sure)) for found in alike if len(found) == len(numbers)), line
                 quoted += 1
     assert quoted > 9
 
