@@ -340,7 +340,7 @@ class SimulationResult(Brief, SavedRecord):
     - ``target``: choice, errors and cost of a run to a target accuracy, None for any other
     - ``temperatures_C``: of "oil", "outer" ring, "inner" ring and "rollers"; None without a heat balance
     - ``thermal``: the balance: "status" ("steady", "undecided", "no steady state", "seizure" or "too hot") and the "reason" of any but the
-      first, "gain" of the loop, heat by node and by way out [W], conductances [W/K], ranges of the temperatures over the
+      first, "gain" and "slopes" of the loop, heat by node and by way out [W], conductances [W/K], ranges of the temperatures over the
       documented inputs of the balance, states visited. ``status`` is "ok" or that of the balance
     - ``damage``: figures of wear and impacts by key, None in results of older versions
     - ``pocket_impacts``: impacts of each pocket in turn, by the keys of their figures; None where they are not followed

@@ -26,7 +26,7 @@ from rbdyn.base.words import label, quantity
 from rbdyn.dynamics.figures import switched_off, why_missing
 from rbdyn.result import TEMPERATURES
 from rbdyn.scene import Scene
-from rbdyn.scene.thermal import first_guess_faults
+from rbdyn.scene.thermal import Near, begun_near, first_guess_faults
 from rbdyn.scene.unknown import plain_values
 
 if TYPE_CHECKING:
@@ -56,6 +56,8 @@ class Problem(Study):
     """Scenes by their class and overrides."""
     surfaces: tuple["Surface", ...] = field(default=(), compare=False, repr=False)
     """Surfaces of its responses, once they are fitted."""
+    near: Mapping[str, Near] = field(default_factory=dict, compare=False, repr=False)
+    """Heat balance in the middle of its region by point of the duty, "" without one, from which those of its runs begin."""
 
     def with_surfaces(self, surfaces: "Iterable[Surface]") -> Self:
         """The same with fitted surfaces."""
@@ -316,10 +318,18 @@ class Problem(Study):
         InputError, which names the point with an impossible value of a factor.
         """
         first, places = self.file.design.seed, range(len(points)) if order is None else order
+        runs = zip(places, points, strict=True)
         return [
-            self.over_duty(partial(self._scene_in_region, point, first + place), self.baseline_scenes)
-            for place, point in zip(places, points, strict=True)
+            self._begun(self.over_duty(partial(self._scene_in_region, point, first + place), self.baseline_scenes))
+            for place, point in runs
         ]
+
+    def _begun(self, run: Run) -> Run:
+        """The run with heat balances that begin from those in the middle of the region, where they are known."""
+        if isinstance(run, Scene):
+            return begun_near(run, self.near.get(""))
+        scenes = {name: begun_near(scene, self.near.get(name)) for name, scene in run.scenes.items()}
+        return replace(run, scenes=scenes)
 
     def _scene_in_region(self, point: Array, seed: int, overrides: Sequence[str]) -> Scene:
         try:
@@ -375,7 +385,9 @@ class Problem(Study):
 
         def run(number: int, point: Array, count: int) -> Run:
             effort = [f"numerics.replicates={count}", *shared]
-            return self.over_duty(lambda sets: self.scene_at(point, number, [*sets, *effort]), self.baseline_scenes)
+            return self._begun(
+                self.over_duty(lambda sets: self.scene_at(point, number, [*sets, *effort]), self.baseline_scenes)
+            )
 
         return [run(*numbered) for numbered in zip(range(seed, seed + len(points)), points, replicates, strict=True)]
 

@@ -10,6 +10,7 @@ itself: it takes more than at the centre, and may close altogether.
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -28,7 +29,7 @@ from rbdyn.mounting.cage import NEARLY_K, RunningClearance
 from rbdyn.result import SimulationResult
 from rbdyn.scene import DrawnScene, Scene
 from rbdyn.scene.lubricant import HOTTEST_C
-from rbdyn.scene.thermal import Temperatures, ceilings, part_temperatures
+from rbdyn.scene.thermal import Near, Temperatures, ceilings, near_of, part_temperatures
 
 # Share of its width that a stated region keeps at least: it is narrowed that far, and moves beyond.
 KEPT = 0.5
@@ -150,7 +151,8 @@ def moved_region(study: Problem, balance: Balances, kept: float = KEPT) -> Regio
     """The study with its region moved to where every clearance stays above its floor at every point of the duty."""
     if not study.has_mounting:
         return Region(study)
-    original, (heat, notes) = study, _heat(study, balance)
+    heat, notes, near = _heat(study, balance)
+    study = original = replace(study, near=near) if near else study
     stays = study.file.reference is not None
     hotter, moves, seen = dict[str, float](), dict[str, Taken](), set[tuple[float, ...]]()
     for _ in range(MOST_LOOKS):
@@ -204,9 +206,17 @@ def _endangered(study: Problem, point: Array, heat: Heat) -> dict[str, RunningCl
 
 
 def _balanced(
-    study: Problem, balance: Balances, point: Array, names: Sequence[str], words: str
+    study: Problem,
+    balance: Balances,
+    point: Array,
+    names: Sequence[str],
+    words: str,
+    near: dict[str, Near] | None = None,
 ) -> dict[str, Temperatures | str]:
-    """Temperatures of a drawing (k,) at these points of the duty by short runs, or why it has none; those undecided are left out."""
+    """Temperatures of a drawing (k,) at these points of the duty by short runs, or why it has none; those undecided are left out.
+
+    ``near`` gets the balances.
+    """
     if not names:
         return {}
     found: dict[str, Temperatures | str] = {}
@@ -219,6 +229,8 @@ def _balanced(
         if isinstance(result, SimulationResult):
             nodes = result.temperatures_C or {}
             found[name] = Temperatures(*(nodes[node].value for node in Temperatures._fields))
+            if near is not None and (balanced := near_of(result)) is not None:
+                near[name] = balanced
         elif not result.cause.startswith("undecided"):
             found[name] = result.cause
     return found
@@ -278,22 +290,23 @@ def _floor(study: Problem, running: RunningClearance) -> float:
     return running.floor if drawn_mm > 0.0 else -math.inf
 
 
-def _heat(study: Problem, balance: Balances) -> tuple[dict[str, list[Temperatures]], list[Note]]:
-    """Temperatures at the centre of the region by point of the duty, and where they are too high.
+def _heat(study: Problem, balance: Balances) -> tuple[dict[str, list[Temperatures]], list[Note], dict[str, Near]]:
+    """Temperatures at the centre of the region by point of the duty, where they are too high, and the balances there.
 
     Raises RunError where the bearing has no steady temperatures even with wider clearances.
     """
-    scenes, heat, causes = (
+    scenes, heat, causes, near = (
         _scenes(study, study.centre, kind=DrawnScene),
         dict[str, list[Temperatures]](),
         dict[str, str](),
+        dict[str, Near](),
     )
     if all(scene.thermal is None for scene in scenes.values()):
-        return {}, []
+        return {}, [], {}
     for kelvins in WIDER_K:
         rest = [name for name in scenes if name not in heat]
         words = "the middle of the region" + (" with wider clearances" if kelvins else "")
-        found = _balanced(study, balance, _wider(study, scenes, kelvins), rest, words)
+        found = _balanced(study, balance, _wider(study, scenes, kelvins), rest, words, near)
         for name in rest:
             outcome = found.get(name, "its temperatures are undecided")
             if isinstance(outcome, Temperatures):
@@ -301,7 +314,8 @@ def _heat(study: Problem, balance: Balances) -> tuple[dict[str, list[Temperature
             else:
                 causes[name] = outcome
         if len(heat) == len(scenes):
-            return heat, [note for name, scene in scenes.items() for note in _too_hot(scene, name, heat[name][0])]
+            notes = [note for name, scene in scenes.items() for note in _too_hot(scene, name, heat[name][0])]
+            return heat, notes, near
     raise RunError(
         "; ".join(
             f"the middle of the region has no steady temperatures{f' at {name}' if name else ''}: {causes[name].rstrip('.')}"

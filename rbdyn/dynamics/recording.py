@@ -209,22 +209,26 @@ class Recording:
 
 
 def recording_of(
-    scene: Scene, bearing: RollerBearing, pace: Pace | None, replicate: int, companions: Companions | None, stop: Stop
+    scene: Scene,
+    bearing: RollerBearing,
+    pace: Pace | None,
+    replicate: int,
+    companions: Companions | None,
+    stop: Stop,
+    starts: Sequence[Array] = (),
 ) -> Recording:
-    """The recording of a replicate, or of a companion of it where ``companions`` says how that is integrated."""
-    return Recording(_run_of(scene, bearing, pace, replicate, companions, stop), companions is None)
+    """The recording of a replicate, or of a companion of it where ``companions`` says how that is integrated.
 
-
-def _run_of(
-    scene: Scene, bearing: RollerBearing, pace: Pace | None, replicate: int, companions: Companions | None, stop: Stop
-) -> Run:
+    ``starts``: states of earlier runs where replicates begin; empty for a start of their own.
+    """
+    begin = starts[replicate] if starts else None
     if companions is None:
-        return Run(scene, bearing, replicate, scene.numerics.rtol, stop, pace)
+        return Recording(Run(scene, bearing, replicate, scene.numerics.rtol, stop, pace, begin=begin), traced=True)
     # The budget covers twice the steps of the longest step.
     needed = math.ceil(2.0 * scene.turn_s / companions.longest_step)
     budget = max(scene.numerics.step_budget_per_turn, needed)
     companion = with_numerics(scene, method=companions.method, step_budget_per_turn=budget)
-    return Run(companion, bearing, replicate, companions.rtol, stop, pace, companions.longest_step)
+    return Recording(Run(companion, bearing, replicate, companions.rtol, stop, pace, companions.longest_step, begin))
 
 
 def record(run: Run) -> Replicate:
@@ -298,7 +302,8 @@ class Ensemble:
     """Replicates and companions as they are counted, and the ``plan`` by which companions are integrated.
 
     ``since``: batch from which they would count if they had settled at once; ``fault``: why companions that were asked for are missing;
-    ``transient_turns``: shaft turns of the transient, None where it is unknown; ``notes``: on the length of the runs.
+    ``transient_turns``: shaft turns of the transient, None where it is unknown; ``notes``: on the length of the runs. ``ends``: last
+    states of the replicates.
     """
 
     runs: list[Replicate]
@@ -308,6 +313,7 @@ class Ensemble:
     fault: str | None
     transient_turns: float | None
     notes: Notes
+    ends: Sequence[Array] = ()
 
 
 # Factor by which a run that has not settled gets longer.

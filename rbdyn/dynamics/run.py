@@ -58,7 +58,7 @@ SMALLEST_STEP_TURNS = 1e-12
 class Run:
     """One replicate under way: parameters, integrator memory and where it is.
 
-    ``longest_step`` [s] limits the steps. ``method``: "auto" until its first step, where the scene leaves it open;
+    ``longest_step`` [s] limits the steps. ``begin``: state of an earlier run where it begins. ``method``: "auto" until its first step, where the scene leaves it open;
     ``spent_s``: time that its steps took; ``pace``: states the time of all runs and knows this one by its ``ticket``.
     """
 
@@ -71,6 +71,7 @@ class Run:
         stop: Stop,
         pace: Pace | None = None,
         longest_step: float = math.inf,
+        begin: Array | None = None,
     ) -> None:
         self.scene, self.bearing, self.replicate, self.stop = scene, bearing, replicate, stop
         self.pace, self.spent_s = pace, 0.0
@@ -78,13 +79,14 @@ class Run:
         self.rtol, self.longest_step = rtol, longest_step
         self.layout = layout_of(scene)
         seeds = np.random.SeedSequence(scene.numerics.seed, spawn_key=(replicate,))
-        y = start_state(scene, bearing, np.random.default_rng(seeds), wall_of(scene, replicate))
+        if begin is None:
+            begin = start_state(scene, bearing, np.random.default_rng(seeds), wall_of(scene, replicate))
         numerics = scene.numerics
         self.method: str = numerics.method
         self.explicit = explicit_method(numerics.method, numerics.rtol)
         first_method = self.explicit if self.method == "auto" else self.method
         first_step = 1e-3 * scales(scene).length / scales(scene).speed
-        self.carry = carry_from(y, bearing.rollers, first_step, method_of(first_method, scene, bearing))
+        self.carry = carry_from(begin.copy(), bearing.rollers, first_step, method_of(first_method, scene, bearing))
         self.tally = empty_tally(
             bearing.rollers, isinstance(bearing.impacts, Impacts), isinstance(bearing.samples, RaceSamples)
         )

@@ -1,13 +1,15 @@
 """Replicates of a scene, gathered with error bars."""
 
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from rbdyn.base.arrays import Array
 from rbdyn.base.files import versions
 from rbdyn.base.notes import Note, Notes, status_of
 from rbdyn.base.words import Notice
@@ -28,11 +30,11 @@ from rbdyn.dynamics.parameters.validity import (
     slip_notes,
 )
 from rbdyn.dynamics.part_figures import part_figures, races_of
-from rbdyn.dynamics.recording import Ensemble, recording_of, run_until_settled, whole_windows
+from rbdyn.dynamics.recording import Ensemble, Recording, recording_of, run_until_settled, whole_windows
 from rbdyn.dynamics.run import explicit_method, prepare, stiffness_cost, stiffness_notes
 from rbdyn.dynamics.statistics.error_bars import error_notes, quantities
 from rbdyn.dynamics.statistics.extremes import return_force_notes
-from rbdyn.dynamics.statistics.metrics import TIGHT, whirl_notes, work_done
+from rbdyn.dynamics.statistics.metrics import TIGHT, Companions, whirl_notes, work_done
 from rbdyn.losses import POWER_TERMS
 from rbdyn.mounting.cage import OperatingClearance
 from rbdyn.result import SimulationResult
@@ -120,9 +122,16 @@ def _pace(scene: Scene, notice: Notice, threads: int) -> Pace:
 
 
 def _ensemble(
-    scene: Scene, bearing: RollerBearing, progress: Reporter, workers: int | None, stop: Stop | None, pace: Pace | None
+    scene: Scene,
+    bearing: RollerBearing,
+    progress: Reporter,
+    starts: Sequence[Array] = (),
+    *,
+    workers: int | None,
+    stop: Stop | None,
+    pace: Pace | None,
 ) -> tuple[Ensemble, dict[str, float]]:
-    """Replicates of a scene with its parameters, and the time [s] that they took."""
+    """Replicates of a scene with its parameters, from ``starts`` where these are given, and the time [s] that they took."""
     compile_s = 0.0
     method = scene.numerics.method, explicit_method(scene.numerics.method, scene.numerics.rtol)
     if (laws := (method, _types(bearing))) not in _prepared:
@@ -131,10 +140,22 @@ def _ensemble(
     started, compiled_s = time.perf_counter(), COMPILING.seconds
     # A replicate that fails stops those of its own scene alone.
     own = Stop(outer=stop)
-    ensemble = run_until_settled(scene, partial(recording_of, scene, bearing, pace), workers, progress, own, pace)
+    recordings = dict[int, Recording]()
+
+    def begin(replicate: int, companions: Companions | None, stop: Stop) -> Recording:
+        recording = recording_of(scene, bearing, pace, replicate, companions, stop, starts)
+        if companions is None:
+            recordings[replicate] = recording
+        return recording
+
+    ensemble = run_until_settled(scene, begin, workers, progress, own, pace)
+    ends = [recordings[place].run.carry.y.copy() for place in range(len(ensemble.runs))]
     # A method that a run tries, and this run first, is compiled then.
     more_s = COMPILING.seconds - compiled_s
-    return ensemble, {"wall_s": time.perf_counter() - started - more_s, "compile_s": compile_s + more_s}
+    return replace(ensemble, ends=ends), {
+        "wall_s": time.perf_counter() - started - more_s,
+        "compile_s": compile_s + more_s,
+    }
 
 
 def _gather(scene: Scene, ensemble: Ensemble, clock: dict[str, float]) -> SimulationResult:

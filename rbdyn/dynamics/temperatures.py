@@ -14,6 +14,7 @@ far wider than these errors, follow from 256 sets of the model of the search wit
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -44,10 +45,11 @@ from rbdyn.scene import Scene
 from rbdyn.scene.input_ranges import Ranges, input_ranges
 from rbdyn.scene.notes import heat_notes
 from rbdyn.scene.thermal import Temperatures, Thermal, at_temperatures, ceilings, inlet_temperature, part_temperatures
-from rbdyn.thermal.fixed_point import VAGUE, State, learned, model_of, steady_state
+from rbdyn.thermal.fixed_point import CLEAR, VAGUE, State, learned, model_of, next_step, steady_state
 from rbdyn.thermal.losses import HOTTEST, HeatModel, gain, log_viscosity, no_rest
 from rbdyn.thermal.network import NODES, carried_off
 
+POWER_LOSS = "power_loss_W"
 # Replicates of a short run, and its counted turns as a share of those of the scene.
 SHORT_REPLICATES, SHORT_SHARE = 2, 0.2
 # Short states of a search at least: two for the balance, and two for the gain of its loop.
@@ -65,8 +67,14 @@ MOST_WHOLE_RUNS = 4
 # Share of the last step that counts as error: its slopes of about 0.3 are known within a third.
 LAST_STEP = 0.1
 
-# Simulates a scene by its parameters: replicates, and the time that they took.
-Simulate = Callable[[Scene, RollerBearing, Reporter], tuple[Ensemble, dict[str, float]]]
+# Least turns in which a search from a similar bearing finds the temperatures, in two parts or a few more; the share of a part that
+# counts in it; turns that do not count after a small step.
+TRANSIENT_TURNS, MOST_PARTS, LATE_SHARES, RESUMED_TURNS = 20.0, 4, (0.4, 0.7), 3.0
+# Steps [K] of such a search: up to which the bearings are similar, and from which its slopes serve.
+SIMILAR, SMALL = 25.0, 3.0
+
+# Simulates a scene by its parameters, from given states if any: replicates, and the time that they took.
+Simulate = Callable[[Scene, RollerBearing, Reporter, Sequence[Array]], tuple[Ensemble, dict[str, float]]]
 # The result of simulated replicates.
 Gather = Callable[[Scene, Ensemble, dict[str, float]], SimulationResult]
 
@@ -124,6 +132,9 @@ def short(scene: Scene) -> Scene:
 
 def short_turns(scene: Scene, threads: int = 1) -> tuple[float, float]:
     """Shaft turns of the short runs of a search that each thread makes one after the other, and those of one run."""
+    if scene.thermal is not None and scene.thermal.near is not None:
+        length = max(scene.numerics.warm_up_turns, TRANSIENT_TURNS)
+        return math.ceil(scene.numerics.replicates / threads) * RESUMED_TURNS, 0.5 * length
     few = short(scene).numerics
     length = few.warm_up_turns + few.turns
     states = SHORT_STATES + (0 if scene.thermal is None or scene.thermal.start is None else START_STATES)
@@ -153,19 +164,20 @@ class Balance:
     def at(
         self,
         temperatures: Array,
-        whole: bool = False,
+        cut: Callable[[Scene], Scene] = short,
         progress: Reporter = None,
         seats: tuple[float, float] | None = None,
+        starts: Sequence[Array] = (),
     ) -> State:
-        """The state, by a ``whole`` run or a short one. Raises InputError where it is impossible, RunError, KeyboardInterrupt.
+        """The state, by the runs of a ``cut`` scene. Raises InputError where it is impossible, RunError, KeyboardInterrupt.
 
-        ``seats``: temperatures of housing and shaft where these do not follow their rings at once [C].
+        ``starts``: states where the replicates begin, if any. ``seats``: temperatures of housing and shaft where these do not follow their rings at once [C].
         """
         hot = at_temperatures(self.scene, Temperatures(*temperatures.tolist()), seats)
         # The numerics of a short run change no parameter, and tables of traction take a quarter of a second.
         bearing = roller_bearing(hot)
         network = network_of(hot, self.thermal, bearing)
-        ensemble, clock = self.simulate(hot if whole else short(hot), bearing, progress)
+        ensemble, clock = self.simulate(cut(hot), bearing, progress, starts)
         self.compile_s += clock["compile_s"]
         self.wall_s += clock["wall_s"]
         self.runs += [*ensemble.runs, *ensemble.companions]
@@ -236,13 +248,17 @@ def corrected(state: State, slopes: Array) -> Array:
 
 
 class Verdict(NamedTuple):
-    """What short runs say: status and reason of the search, slopes dM/dT, states visited, and where to run at length [C]."""
+    """What short runs say: status and reason of the search, slopes dM/dT, states visited, and where to run at length [C].
+
+    ``ends``: last states of the replicates, from which these go on; empty where the run at length begins anew.
+    """
 
     status: str
     reason: str
     slopes: Array
     path: list[State]
     temperatures: Array
+    ends: Sequence[Array] = ()
 
     @property
     def steady(self) -> bool:
@@ -268,6 +284,55 @@ def verdict_of(balance: Balance) -> Verdict:
     return Verdict(search.status, search.reason, search.slopes, [*search.states], temperatures)
 
 
+def near_verdict(balance: Balance) -> Verdict | None:
+    """Search from the balance of a similar bearing by the turns of all replicates that do not count; None where it is not similar.
+
+    Replicates go on from part to part of their transient, at temperatures that follow from the part before.
+    """
+    near = balance.thermal.near
+    if near is None:
+        return None
+    slopes, temperatures, path, ends = np.array(near.slopes), np.array(near.temperatures_C), list[State](), ()
+    for part in range(MOST_PARTS):
+        try:
+            state = balance.at(temperatures, partial(_part, LATE_SHARES[min(part, 1)]), starts=ends)
+        except (InputError, RunError):
+            return None
+        if (
+            path
+            and CLEAR * max(state.noise.max(), 1e-9) < np.abs(step := state.temperatures - path[-1].temperatures).max()
+        ):
+            slopes = learned(slopes, step, state.image - path[-1].image)
+        if gain(slopes) >= DOUBTFUL or state.noise.max() > VAGUE:
+            return None
+        path.append(state)
+        temperatures = np.minimum(
+            state.temperatures + next_step(state.model.with_image_slopes(slopes), state, None), HOTTEST
+        )
+        ends, size = state.run.ensemble.ends, np.abs(temperatures - state.temperatures).max()
+        if size > SIMILAR:
+            return None
+        if part and size < SMALL:
+            return Verdict("steady", "", slopes, path, temperatures, ends)
+    return None
+
+
+def _part(late: float, scene: Scene) -> Scene:
+    """The scene with runs of half its transient, of which the share ``late`` counts."""
+    length = 0.5 * max(scene.numerics.warm_up_turns, TRANSIENT_TURNS)
+    counted = {"turns": late * length, "discard_turns": (1.0 - late) * length}
+    return with_numerics(short(scene), **counted, replicates=scene.numerics.replicates)
+
+
+def _whole(scene: Scene) -> Scene:
+    return scene
+
+
+def _resumed(scene: Scene) -> Scene:
+    """The scene with runs that go on from settled states."""
+    return with_numerics(scene, discard_turns=min(RESUMED_TURNS, scene.numerics.warm_up_turns))
+
+
 class Balanced(NamedTuple):
     """A result at steady temperatures, or at the last possible ones, with its balance and the states visited."""
 
@@ -281,12 +346,13 @@ def with_temperatures(
 ) -> Balanced:
     """The result of a scene with [thermal]; ``only_steady``: or RunError once short runs show no steady state. Raises as ``verdict_of``."""
     balance = Balance(scene, simulate)
-    verdict = verdict_of(balance)
+    verdict = near_verdict(balance) or verdict_of(balance)
     if only_steady and not verdict.steady:
         raise RunError(f"{verdict.status}: {verdict.reason}")
-    path, temperatures = verdict.path, verdict.temperatures
+    path, temperatures, ends = verdict.path, verdict.temperatures, verdict.ends
     for _ in range(MOST_WHOLE_RUNS if verdict.steady else 1):
-        state = balance.at(temperatures, True, progress)
+        state = balance.at(temperatures, _resumed if ends else _whole, progress, starts=ends)
+        ends = ends and state.run.ensemble.ends
         path.append(state)
         temperatures = corrected(state, verdict.slopes)
         if _closes(state, verdict.slopes):
@@ -334,6 +400,9 @@ def _result(
     result = gather(
         trial.hot, trial.ensemble, {**trial.clock, "compile_s": balance.compile_s, "wall_s": balance.wall_s}
     )
+    figures = result.figures
+    if steady and scene.thermal is not None and scene.thermal.near is not None:
+        figures = figures | {POWER_LOSS: _shifted(figures[POWER_LOSS], heat_to_steady(state, slopes))}
     network = trial.network
     heat = network.terms(powers_of(trial.ensemble.runs)) @ network.term_shares
     ranges = _ranges(scene, trial.hot, path, slopes) if steady else None
@@ -341,6 +410,7 @@ def _result(
         "status": status,
         **({"reason": reason} if reason else {}),
         "gain": gain(slopes),
+        **({"slopes": slopes.tolist()} if steady else {}),
         "heat_W": dict(zip(NODES, heat.tolist(), strict=True)),
         "windage_W": network.windage,
         "carried_off_W": carried_off(network.conductances, network.boundaries, state.image),
@@ -351,6 +421,7 @@ def _result(
     }
     return replace(
         result,
+        figures=figures,
         status=result.status if status == "steady" else status,
         temperatures_C=temperatures,
         part_figures=at_temperatures_with_errors(scene, result.part_figures or {}, temperatures),
@@ -359,6 +430,17 @@ def _result(
         cost={**result.cost, **work_done(balance.runs), "turns": balance.turns, "states": len(path)},
         notes=(*_notes(scene, trial.hot, status, reason, ranges), *_new(result.notes, scene, trial.hot, status)),
     )
+
+
+def heat_to_steady(state: State, slopes: Array) -> float:
+    """Heat of the steady state less that of a state next to it [W]: 1'G dM/dT (T* - T)."""
+    return float((state.model.matrix @ slopes @ (corrected(state, slopes) - state.temperatures)).sum())
+
+
+def _shifted(loss: Quantity, more: float) -> Quantity:
+    """A loss [W] that is so much larger, whose slopes are as uncertain as those of the last step."""
+    numerical = None if loss.numerical_error is None else math.hypot(loss.numerical_error, LAST_STEP * more)
+    return replace(loss, value=loss.value + more, numerical_error=numerical)
 
 
 def _ranges(scene: Scene, hot: Scene, path: Sequence[State], slopes: Array) -> Ranges:

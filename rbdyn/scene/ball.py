@@ -588,6 +588,8 @@ def _thermal_faults(scene: BallScene) -> Iterator[str]:
     ):
         if value != usual:
             yield f"thermal.{key} = {value:g}: the model of ball bearings has no cage; leave it out"
+    if thermal.near is not None:
+        yield "[thermal.near]: shortens simulations of rollers; the balance of ball bearings has none; remove it"
     start, oil, mounting = thermal.start, scene.lubricant, scene.mounting
     if start is not None and oil is not None and mounting is not None:
         from rbdyn.life.balls import FASTEST

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NamedTuple
 
 from pydantic import Field
 
-from rbdyn.base.faults import NonNegative, Positive, Share, Sparse
+from rbdyn.base.faults import NonNegative, Positive, Share, Sparse, Strict
 from rbdyn.scene.lubricant import HOTTEST_C, Lubricant, OilCelsius
 from rbdyn.scene.operation import Mounting
 from rbdyn.scene.start import Start
@@ -40,6 +40,22 @@ NO_MOUNTING = (
 )
 
 
+# One number for each of the four temperatures.
+Slopes = Annotated[list[float], Field(min_length=4, max_length=4)]
+
+
+class Near(Strict):
+    """Heat balance of a similar roller bearing, from which the search begins: it takes less than half of the short runs. A study states
+    that of the middle of its region for its design runs. Where it is far from this bearing, the search begins as without it.
+    """
+
+    temperatures_C: Annotated[list[OilCelsius], Field(min_length=4, max_length=4)]  # noqa: N815
+    """Temperatures of oil, outer ring, inner ring and rollers, as a result has them."""
+    slopes: Annotated[list[Slopes], Field(min_length=4, max_length=4)]
+    """Change of each temperature that the network computes, one row each, by one kelvin more of each temperature assumed:
+    "slopes" under "thermal" of a result."""
+
+
 class Thermal(Sparse):
     """Heat balance of the bearing, which computes its temperatures: oil, outer ring with housing, inner ring with shaft, and
     rolling elements with cage have one temperature each.
@@ -48,7 +64,7 @@ class Thermal(Sparse):
     first guess and optional. The result has the temperatures, their errors and what the loop of heat and clearance does.
     """
 
-    UNSAVED: ClassVar[Mapping[str, Any]] = {"start": None}
+    UNSAVED: ClassVar[Mapping[str, Any]] = {"start": None, "near": None}
 
     ambient_C: OilCelsius = 20.0  # noqa: N815
     """Temperature around housing and shaft; ISO 15312 has 20."""
@@ -83,6 +99,8 @@ class Thermal(Sparse):
     """Highest temperature of the cage. Default by material: PEEK 150, phenolic laminate 120, none for metals."""
     start: Start | None = None
     """Start of the cold machine: temperatures and clearances over time until they are steady; without it only the steady state."""
+    near: Near | None = None
+    """Heat balance of a similar bearing, from which the search begins. Default: a search from lubricant.temperature_C."""
 
 
 class Temperatures(NamedTuple):
@@ -269,6 +287,22 @@ def at_temperatures(scene: "Scene", temperatures: Temperatures, seats: tuple[flo
         tables["lubricant"]["viscosity_mPas"] = 1e3 * scene.lubricant.at(oil).viscosity
     tables["mounting"] |= part_temperatures(thermal, temperatures, seats=seats)
     return scene.from_dict(tables, f"the bearing at {oil:.4g} C")
+
+
+def begun_near(scene: "Scene", near: Near | None) -> "Scene":
+    """The scene with a heat balance that begins from a similar one, if that and a balance are given."""
+    if near is None or scene.thermal is None:
+        return scene
+    return scene.model_copy(update={"thermal": scene.thermal.model_copy(update={"near": near})})
+
+
+def near_of(result: "SimulationResult") -> Near | None:
+    """The heat balance of a result for that of a similar bearing, to digits that other processors give too; None without slopes."""
+    if result.temperatures_C is None or result.thermal is None or "slopes" not in result.thermal:
+        return None
+    nodes = [round(result.temperatures_C[node].value, 1) for node in Temperatures._fields]
+    slopes = [[round(slope, 2) + 0.0 for slope in row] for row in result.thermal["slopes"]]
+    return Near(temperatures_C=nodes, slopes=slopes)
 
 
 def simulated_scene(result: "SimulationResult", source: str = "scene") -> "Scene":

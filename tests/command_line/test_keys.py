@@ -128,7 +128,7 @@ UNITS = {
         land_film_floor least_clearance outer_interference pocket_film_floor preload race_damping_engagement race_roughness
         roller_diameter_errors roller_diameter_spread roller_roughness""",
     "N": "axial_load dynamic_capacity load lundberg_load preload radial_load rotating_load static_capacity",
-    "C": "ambient cage_ceiling from from_parts oil_ceiling oil_inlet_temperature housing_temperature inner_ring_temperature outer_ring_temperature reference_temperature roller_temperature cage_temperature shaft_temperature temperature",
+    "C": "ambient cage_ceiling from from_parts oil_ceiling oil_inlet_temperature housing_temperature inner_ring_temperature outer_ring_temperature reference_temperature roller_temperature cage_temperature shaft_temperature temperature temperatures",
     "K": "cage_offset lower temperature_rise upper",
     "deg": "contact_angle gravity_direction phase tilt_direction",
     "mrad": "tilt tilt_x tilt_y",

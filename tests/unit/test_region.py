@@ -14,6 +14,7 @@ from instant_runs import instant_result, instantly, unillustrated
 from short_studies import EXAMPLES, region_that_runs, run_design, run_study, silent
 from typer.testing import CliRunner
 
+from doe.clearance import points_of
 from doe.cli import app
 from doe.designs import central_composite
 from doe.designs.model import lost_terms, model_terms
@@ -251,7 +252,7 @@ def heated_study(folder: Path, centre: float = 0.2, step: float = 0.1) -> Proble
     return study
 
 
-def heats(monkeypatch, seizing: float = 0.0, oil: float = 80.0) -> list[Scene]:
+def heats(monkeypatch, seizing: float = 0.0, oil: float = 80.0, slopes: list[list[float]] | None = None) -> list[Scene]:
     """Simulations in no time with temperatures, of which those below a guide clearance seize; the scenes that ran."""
     ran: list[Scene] = []
     instantly(monkeypatch.setattr)
@@ -263,7 +264,7 @@ def heats(monkeypatch, seizing: float = 0.0, oil: float = 80.0) -> list[Scene]:
             instant_result(scene),
             temperatures_C={name: Quantity(value, 0.1, 0.1, 10.0, 9) for name, value in nodes.items()},
         )
-        record = {"status": "steady", "ranges": None, "path_C": [nodes]}
+        record = {"status": "steady", "ranges": None, "path_C": [nodes]} | ({"slopes": slopes} if slopes else {})
         if scene.cage.guide_clearance_mm < seizing:
             return replace(result, status="seizure", thermal={**record, "reason": "the cage seizes when hot"})
         return replace(result, thermal=record)
@@ -290,6 +291,26 @@ def test_heat_balances_are_made_once_and_resumed(tmp_path, monkeypatch):
     assert region_in_store(study, tmp_path).file == region.study.file
     record = CliRunner().invoke(app, ["status", str(study.path), "--out", str(tmp_path), "--json"])
     assert record.exit_code == 0, record.output
+
+
+def test_balances_of_design_runs_begin_in_the_middle_of_the_region(tmp_path, monkeypatch):
+    """The scenes and keys of design runs have its temperatures and slopes, rounded; those of confirmations have none, and the store
+    tells the same keys again."""
+    study, slopes = heated_study(tmp_path), (-0.123456 * np.eye(4)).tolist()
+    heats(monkeypatch, slopes=slopes)
+    region = region_that_runs(study, tmp_path, 1).study
+    for scene in region.plan.scenes:
+        near = scene.thermal.near
+        assert near.slopes[1] == [0.0, -0.12, 0.0, 0.0] and near.temperatures_C == [HEATED[name] for name in HEATED]
+        assert Scene.from_dict(scene.model_dump(mode="json")).model_dump_json() == scene.model_dump_json()
+    assert region.confirmation_run(region.baseline).thermal.near is None
+    (adaptive,) = region.adaptive_scenes(region.baseline[None], [2], 0)
+    assert adaptive.thermal.near == near
+    keys = [point.key for point in points_of(region.plan.scenes, region.plan.labels)]
+    seen = region_in_store(study, tmp_path).plan
+    assert [point.key for point in points_of(seen.scenes, seen.labels)] == keys
+    unbegun = replace(region, near={}).plan
+    assert not {*keys} & {point.key for point in points_of(unbegun.scenes, unbegun.labels)}
 
 
 def test_a_bearing_with_clearance_to_spare_is_balanced_once(tmp_path, monkeypatch):

@@ -11,11 +11,14 @@ import pytest
 
 from rbdyn import Scene, history, simulate
 from rbdyn.base.faults import InputError, RunError, read_toml
+from rbdyn.dynamics.parameters.heat import heat_model, network_of
 from rbdyn.dynamics.parameters.model import roller_bearing
+from rbdyn.dynamics.temperatures import Balance, heat_to_steady
 from rbdyn.result import SimulationResult
 from rbdyn.scene.notes import heat_notes
-from rbdyn.scene.thermal import Temperatures, at_temperatures, simulated_scene
+from rbdyn.scene.thermal import Temperatures, at_temperatures, near_of, simulated_scene
 from rbdyn.scene.unknown import documented_of
+from rbdyn.thermal.fixed_point import State
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 SHORT = {
@@ -434,3 +437,57 @@ def test_unit_slight_heat_takes_one_short_state(monkeypatch):
     assert found.cost["rhs_evaluations"] < 0.8 * searched.cost["rhs_evaluations"]
     for node, figure in found.temperatures_C.items():
         assert figure.value == pytest.approx(searched.temperatures_C[node].value, abs=0.2)
+
+
+def _near(result: SimulationResult, **changes: Any) -> dict[str, Any]:
+    """The balance of a result as that of a similar bearing."""
+    near = near_of(result)
+    assert near is not None
+    return near.model_dump() | changes
+
+
+def test_unit_a_search_from_a_similar_bearing_needs_no_turn_of_its_own(hot):
+    """Unit: it finds the same temperatures and figures within their errors, within the turns of the transient, by any number of threads."""
+    numerics = {**SHORT, "turns": 20.0, "discard_turns": 20.0, "companion": False, "impact_window_turns": 5.0}
+    changes = {"numerics": numerics, "bearing": {"radial_clearance_mm": 0.024}, "cage": {"guide_clearance_mm": 0.18}}
+    far = simulate(_scene(**changes), workers=1, notice=None)
+    near = simulate(_scene(**changes, thermal={"near": _near(hot)}), workers=1, notice=None)
+    assert near.status == "ok" and near.thermal["status"] == "steady"
+    turns = numerics["replicates"] * (numerics["discard_turns"] + 3.0 + numerics["turns"])
+    assert near.cost["turns"] == pytest.approx(turns) and near.cost["turns"] < 0.5 * far.cost["turns"]
+    for node, figure in far.temperatures_C.items():
+        other = near.temperatures_C[node]
+        assert abs(other.value - figure.value) <= 1.5 * math.hypot(figure.error, other.error) + 0.02
+    assert near.power_loss_W.value == pytest.approx(far.power_loss_W.value, rel=3e-3)
+    again = simulate(_scene(**changes, thermal={"near": _near(hot)}), workers=2, notice=None)
+    records = [result.as_dict() for result in (near, again)]
+    for record in records:
+        del record["cost"]
+    assert records[0] == records[1]
+
+
+@pytest.mark.parametrize("changes", [{"temperatures_C": [20.0] * 4}, {"slopes": (0.9 * np.eye(4)).tolist()}])
+def test_unit_a_search_from_another_bearing_begins_anew(hot, changes):
+    """Unit: far temperatures, or a loop near its stability, give the bits of a search without them, but for the steady loss."""
+    far = simulate(_scene(), workers=1, notice=None)
+    near = simulate(_scene(thermal={"near": _near(hot, **changes)}), workers=1, notice=None)
+    assert near.temperatures_C == far.temperatures_C and near.impact_force_N == far.impact_force_N
+    assert near.cost["turns"] > far.cost["turns"] and near.thermal["slopes"] == far.thermal["slopes"]
+    assert near.power_loss_W.value == pytest.approx(far.power_loss_W.value, rel=2e-3)
+
+
+def test_unit_the_heat_of_the_steady_state_is_exact_where_it_is_linear(hot):
+    """Unit: with heat that is linear in the temperatures, a state next to the steady one gives the heat of the steady one."""
+    balance = Balance(_scene(), None)
+    bearing = roller_bearing(simulated_scene(hot))
+    network = network_of(simulated_scene(hot), balance.thermal, bearing)
+    nodes, powers = np.array([90.0, 92.0, 95.0, 99.0]), np.full(network.weights.shape[1], 20.0)
+    model = heat_model(simulated_scene(hot), network, nodes, powers, balance.viscosity)
+    rest = np.array([[-0.4, 0.1, 0.0, -0.2], [0.2, -0.6, 0.3, 0.0], [0.1, 0.2, -0.5, -0.1], [0.0, -0.3, 0.2, -0.2]])
+    linear = model._replace(losses=model.losses._replace(exponents=np.zeros_like(model.losses.exponents)), rest=rest)
+    slopes = linear.image_slopes(nodes)
+    state = State(nodes, nodes + np.linalg.solve(linear.matrix, linear.excess(nodes)), np.zeros(4), linear)
+    steady = linear.balanced()
+    assert np.abs(steady - nodes).max() > 1.0
+    more = float((linear.heat(steady) - linear.heat(nodes)).sum())
+    assert heat_to_steady(state, slopes) == pytest.approx(more, rel=1e-9)
