@@ -582,11 +582,8 @@ def _thermal_faults(scene: BallScene) -> Iterator[str]:
             yield NO_MOUNTING
     if scene.operation.inner_speed_rpm == scene.operation.outer_speed_rpm:
         yield f"operation.inner_speed_rpm = {scene.operation.inner_speed_rpm:g}: [thermal] needs rings that turn against each other"
-    for key, value, usual in (
-        ("cage_offset_K", thermal.cage_offset_K, 0.0),
-        ("cage_ceiling_C", thermal.cage_ceiling_C, None),
-    ):
-        if value != usual:
+    for key, usual in (("cage_offset_K", 0.0), ("cage_ceiling_C", None)):
+        if (value := getattr(thermal, key)) != usual:
             yield f"thermal.{key} = {value:g}: the model of ball bearings has no cage; leave it out"
     if thermal.near is not None:
         yield "[thermal.near]: shortens simulations of rollers; the balance of ball bearings has none; remove it"
