@@ -1,8 +1,10 @@
 """Class of the cage at default numerics against runs of sixteen times the length, on seeded bearings of `rbdyn new`.
 
-python examples/benchmarks/cage_verdict.py [--seeds N] [--times N]: about half an hour for the ten bearings on two cores. A bearing is in
-the catalogue or on a drawing, guided by a ring or its rollers, at 0.5 to 2 times the speed and 0.02 to 1 times the load that the
-command takes by default. A row states both classes with their replicates, and whether classes that are named agree.
+python examples/benchmarks/cage_verdict.py [--seeds N] [--times N] [--moving]: about half an hour for the ten bearings on two cores. A
+bearing is in the catalogue or on a drawing, guided by a ring or its rollers, at 0.5 to 2 times the speed and 0.02 to 1 times the load
+that the command takes by default. With `--moving` no static load holds the cage: odd seeds have preloaded rollers that guide it, with
+pocket friction of 0.03 to 0.4, even seeds a load that rotates with the shaft. A row states both classes with their replicates, and
+whether classes that are named agree.
 
 Seeds 1 to 10: held in both in all ten, none undecided; 95 to 194 s of processor time each for the long runs of the last six. No other
 class is among them, so the comparison says nothing about circling or whirl.
@@ -48,6 +50,29 @@ def seeded(seed: int) -> tuple[str, Scene]:
     return f"{arguments[0]}, {guidance}, {oil}, {speed:.4g} rpm, {load:.4g} N", scene
 
 
+def moving(seed: int, words: str, scene: Scene) -> tuple[str, Scene]:
+    """The bearing without the static load that holds its cage, in words and as a scene."""
+    draw = np.random.default_rng((seed, 1))
+    load = scene.operation.radial_load_N
+    if seed % 2:
+        friction = float(np.exp(draw.uniform(np.log(0.03), np.log(0.4))))
+        changes = {
+            "cage.guidance": "roller",
+            "bearing.radial_clearance_mm": -0.01,
+            "model.pocket_friction": f"{friction:.3g}",
+        }
+        words += f", on preloaded rollers, pocket friction {friction:.3g}"
+    else:
+        friction = float(draw.choice([0.05, 0.1, 0.3]))
+        changes = {
+            "operation.rotating_load_N": f"{load:.4g}",
+            "model.guide_land": "dry",
+            "model.land_friction": friction,
+        }
+        words += f", load rotates, dry land with friction {friction:g}"
+    return words, scene.overridden(["operation.radial_load_N=0", *(f"{key}={value}" for key, value in changes.items())])
+
+
 def judged(scene: Scene) -> tuple[str, str, float]:
     """Class, the verdict in words, and the time it took [s]."""
     started = time.perf_counter()
@@ -56,11 +81,13 @@ def judged(scene: Scene) -> tuple[str, str, float]:
     return found.name, found.words, time.perf_counter() - started
 
 
-def main(seeds: int, times: int) -> None:
+def main(seeds: int, times: int, without_static_load: bool) -> None:
     """Print a row a bearing, and the counts."""
     counts = {"agree": 0, "differ": 0, "open": 0}
     for seed in range(1, seeds + 1):
         words, scene = seeded(seed)
+        if without_static_load:
+            words, scene = moving(seed, words, scene)
         turns = times * scene.numerics.turns
         long = scene.overridden(
             [
@@ -85,5 +112,6 @@ if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seeds", type=int, default=10)
     parser.add_argument("--times", type=int, default=16)
+    parser.add_argument("--moving", action="store_true", help="cages that no static load holds")
     options = parser.parse_args()
-    main(options.seeds, options.times)
+    main(options.seeds, options.times, options.moving)

@@ -87,7 +87,7 @@ def _(tangential, model, slip, load):
 
 @law
 def steady_by_table(tangential, model, slip, load, value, slope):
-    """``steady_traction`` of a law without its table, from its ``table_value``."""
+    """``steady_traction`` of a law without its table, from value and slope of its ``table_cubic``."""
 
 
 @steady_by_table.body(RigidContact)

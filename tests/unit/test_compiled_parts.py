@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 from typing import Any, NamedTuple
 
 import numpy as np
+import pytest
+from conftest import ROOT
 from numba import types
 from numpy.typing import NDArray
 
@@ -82,3 +87,31 @@ def test_unit_a_routine_is_called_where_a_kernel_is_copied() -> None:
 
     around.compile((types.float64,))
     assert [next(iter(each.overloads.values())).fndesc.inline for each in (apart, around)] == [False, True]
+
+
+COUNTING_FUNCTIONS = r"""
+import re, sys
+import rbdyn
+from rbdyn.dynamics.integrators.advance import advance
+
+short = ["numerics.turns=1", "numerics.discard_turns=0", "numerics.extend=false", "numerics.replicates=1"]
+rbdyn.simulate(sys.argv[1], overrides=[*short, *sys.argv[2:]], notice=None)
+(compiled,) = advance.overloads.values()
+for function in re.split(r"^define ", compiled.library.get_llvm_str(), flags=re.M)[1:]:
+    if "call void @NRT_incref" in function:
+        print(*re.findall(r"\d+([a-z_]+)B\d+v\d+", function.partition("{")[0])[:1])
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("overrides", [[], ["traction.model=thermal_newtonian", "model.open_contact_film=true"]])
+def test_invariant_no_step_counts_references(tmp_path, overrides):
+    """Invariant: atomic instructions count references to arrays at the call of ``advance``, and where it creates arrays; they
+    took a tenth of a scene with tables."""
+    scene = ROOT / "examples" / "cylindrical_roller.toml"
+    environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path)}
+    ran = subprocess.run(
+        [sys.executable, "-c", COUNTING_FUNCTIONS, scene, *overrides], env=environment, capture_output=True, text=True
+    )
+    assert ran.returncode == 0, ran.stderr
+    assert set(ran.stdout.split()) == {"advance", "refine_peak"}

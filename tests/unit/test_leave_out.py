@@ -24,7 +24,7 @@ from rbdyn.accuracy.variants import OPTIONS, with_options
 from rbdyn.contact.cage_film import journal_film_force, wall_film
 from rbdyn.contact.hertz_line import sum_of_slices
 from rbdyn.contact.rolling_resistance import film_forces
-from rbdyn.contact.traction import asperity_load_share, bicubic
+from rbdyn.contact.traction import asperity_load_share, cubic
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.forces.cage import dry_walls, film_on_wall, journal_wrench
 from rbdyn.dynamics.forces.race_lanes import open_contact
@@ -82,7 +82,7 @@ LAWS = {
 }
 # Kernels that only these options call.
 KERNELS_OF_OPTIONS = (
-    sum_of_slices, turned_multiple, bicubic, asperity_load_share, film_forces, open_contact, wall_film, film_on_wall,
+    sum_of_slices, turned_multiple, cubic, asperity_load_share, film_forces, open_contact, wall_film, film_on_wall,
     segment,
 )  # fmt: skip
 # Numbers that an option adds to the state: a ring's place and velocity, or time and two angles, or two coefficients a roller.
@@ -219,7 +219,7 @@ def test_unit_the_state_holds_what_moves(outer, everything):
         sizes.append(sum(part.size for part in arrays_of(run)))
     assert sizes[1] - sizes[0] == 11 * (4 + 3)
     # How rollers and races meet, kept between loops, and what is followed of each roller.
-    assert sizes[0] < 11 * 60 + 540 + 256 + 60
+    assert sizes[0] < 11 * 60 + 540 + 320 + 60
 
 
 def test_unit_parameters_are_few(outer, optional):

@@ -1,26 +1,10 @@
 """Impacts of rollers in their pockets, from the first approach of a contact to its end, followed over the ends of steps."""
 
-from typing import Any, NamedTuple
-
-import numpy as np
-from numpy.typing import NDArray
-
 from rbdyn.compiled.kernel import kernel, law, routine
 from rbdyn.dynamics.forces.cage import Impacts, NoImpacts, pocket_approach
 from rbdyn.dynamics.forces.equations import cage_motion, pocket_direction, roller_count
 from rbdyn.dynamics.forces.races import roller_radius
 from rbdyn.dynamics.forces.state import APPROACH, EXPONENTS, NUMBER, PEAK, PEAK_POWERS, ROLLER_STATES, SQUARES
-
-
-class Pockets(NamedTuple):
-    """What ``RollerBearing`` says of the pockets: all of it would be passed number by number."""
-
-    rollers: int
-    sizes: Any
-    pocket: Any
-    pocket_cos: NDArray[np.float64]
-    pocket_sin: NDArray[np.float64]
-
 
 SLOWEST_APPROACH = 1e-30  # [m/s], for a contact that begins without one
 
@@ -47,17 +31,16 @@ def _(impacts, bearing, y, gap, followed, sums):
         followed[PEAK, j] = max(followed[PEAK, j], -gap[j])
         changes += 1 if (gap[j] < 0.0) != (followed[APPROACH, j] > 0.0) else 0
     if changes > 0:
-        pockets = Pockets(bearing.rollers, bearing.sizes, bearing.pocket, bearing.pocket_cos, bearing.pocket_sin)
-        book_changes(impacts, pockets, y, gap, followed, sums)
+        book_changes(impacts, bearing, y, gap, followed, sums)
 
 
 @routine
-def book_changes(impacts, pockets, y, gap, followed, sums):
+def book_changes(impacts, bearing, y, gap, followed, sums):
     """``book_impacts`` where contacts begin or end."""
-    for j in range(pockets.rollers):
+    for j in range(roller_count(bearing)):
         if gap[j] < 0.0:
             if followed[APPROACH, j] == 0.0:
-                followed[APPROACH, j] = max(first_approach(pockets, y, j), SLOWEST_APPROACH)
+                followed[APPROACH, j] = max(first_approach(bearing, y, j), SLOWEST_APPROACH)
         else:
             if followed[APPROACH, j] > impacts.speed:
                 book_impact(impacts, followed[APPROACH, j], followed[PEAK, j], j, sums)
@@ -74,12 +57,12 @@ def book_impact(impacts, speed, peak, j, sums):
 
 
 @kernel
-def first_approach(pockets, y, j):
+def first_approach(bearing, y, j):
     """Speed [m/s] at which roller ``j`` nears the nearest part of its pocket."""
-    z = roller_count(pockets)
+    z = roller_count(bearing)
     cage = cage_motion(y, ROLLER_STATES * z)
-    ex, ey = pocket_direction(pockets, cage.cos, cage.sin, j)
+    ex, ey = pocket_direction(bearing, cage.cos, cage.sin, j)
     dx, dy, dvx, dvy = y[j] - cage.x, y[z + j] - cage.y, y[2 * z + j] - cage.vx, y[3 * z + j] - cage.vy
     offset, height = dy * ex - dx * ey, dx * ex + dy * ey
     across, along = dvy * ex - dvx * ey - cage.speed * height, dvx * ex + dvy * ey + cage.speed * offset
-    return pocket_approach(pockets.pocket, roller_radius(pockets.sizes, j), offset, height, across, along)
+    return pocket_approach(bearing.pocket, roller_radius(bearing.sizes, j), offset, height, across, along)

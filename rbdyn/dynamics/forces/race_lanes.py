@@ -39,8 +39,9 @@ from rbdyn.contact.traction import (
     NoTraction,
     SurfaceAxes,
     TractionSurface,
+    cubic,
+    table_cubic,
     table_place,
-    table_value,
     without_table,
 )
 from rbdyn.dynamics.forces.races import (
@@ -69,11 +70,11 @@ FORCE_X, FORCE_Y, ROLLER_MOMENT, RING_MOMENT, LOAD, TRACTION, ROLLING, DAMPING, 
     0, OUTPUTS * LANES, LANES
 )
 # Where the rows between the loops of a law with a table begin: the fields of ``RaceApproach``, side and traction
-# coefficient, and the place in the table, later its value and slope.
-INPUTS = 16
+# coefficient, the place in the table, and four coefficients for each lane in turn.
+INPUTS = 20
 (
     NX, NY, INVERSE, SLOPE, LEAN, MET_LOAD, STIFFNESS, MET_DAMPING, ROLLER_LEVER, RING_LEVER, SLIP, ENTRAINMENT,
-    SIDE, COEFFICIENT, ALONG, ACROSS,
+    SIDE, COEFFICIENT, ALONG, ACROSS, CUBIC, _, _, _,
 ) = range(0, INPUTS * LANES, LANES)  # fmt: skip
 
 
@@ -113,33 +114,18 @@ def scratch(rollers: int) -> Scratch:
 
 
 @law
-def radii_in_order(sizes, unused):
-    """Array of the radii of all rollers; ``unused`` where all have one."""
-
-
-@radii_in_order.body(EqualRollers)
-def _(sizes, unused):
-    return unused
-
-
-@radii_in_order.body(UnequalRollers)
-def _(sizes, unused):
-    return sizes.radii
-
-
-@law
-def lane_radius(sizes, radii, place):
-    """Radius of the roller in a lane, from ``radii`` where rollers differ [m]."""
+def lane_radius(sizes, packed, lane):
+    """Radius of the roller in a lane of ``packed`` [m]."""
 
 
 @lane_radius.body(EqualRollers)
-def _(sizes, radii, place):
+def _(sizes, packed, lane):
     return sizes.radius
 
 
 @lane_radius.body(UnequalRollers)
-def _(sizes, radii, place):
-    return radii[place]
+def _(sizes, packed, lane):
+    return packed[RADII + lane]
 
 
 @law
@@ -286,9 +272,12 @@ def approach_of_lane(met, i):
 
 @kernel
 def look_up(traction_model, met, first, count):
-    """Replace the places in the table of the lanes from ``first`` to ``count`` by its values and slopes."""
+    """Write the cubics along the slip of the lanes from ``first`` to ``count``, whose place in the cell replaces that in the table."""
     for i in range(first, count):
-        met[ALONG + i], met[ACROSS + i] = table_value(traction_model, met[ALONG + i], met[ACROSS + i])
+        place = CUBIC + 4 * i
+        met[place], met[place + 1], met[place + 2], met[place + 3], met[ALONG + i] = table_cubic(
+            traction_model, met[ALONG + i], met[ACROSS + i]
+        )
 
 
 @kernel
@@ -297,9 +286,9 @@ def wrenches(outer, inner, met, lanes, count):
     for i in range(lanes_to_fill(inner, count)):
         side = met[SIDE + i]
         race, approach = either(side > 0.0, outer, inner), approach_of_lane(met, i)
-        steady = steady_by_table(
-            race.tangential, race.traction, approach.slip, approach.load, met[ALONG + i], met[ACROSS + i]
-        )
+        place = CUBIC + 4 * i
+        value, slope = cubic(met[place], met[place + 1], met[place + 2], met[place + 3], met[ALONG + i])
+        steady = steady_by_table(race.tangential, race.traction, approach.slip, approach.load, value, slope)
         keep_lane(race.tangential, lanes, i, race_wrench(race, side, approach, steady, met[COEFFICIENT + i]))
 
 
@@ -313,10 +302,9 @@ def outer_block(traction_model, race, sizes, ring, y, first, rollers, scratch, c
 
 @outer_block.body(NoTraction, FourConstantTraction, BlendedFourConstantTraction, CoulombTraction)
 def _(traction_model, race, sizes, ring, y, first, rollers, scratch, count):
-    radii = radii_in_order(sizes, y)
     for i in range(lanes_to_fill(race, count)):
         j = first + i
-        approach = approach_in_lane(race, 1.0, lane_radius(sizes, radii, j), ring, y, j, rollers)
+        approach = approach_in_lane(race, 1.0, roller_radius(sizes, j), ring, y, j, rollers)
         steady = steady_traction(race.tangential, race.traction, approach.slip, approach.load)
         coefficient = coefficient_of(race.tangential, y, j)
         keep_lane(race.tangential, scratch.lanes, i, race_wrench(race, 1.0, approach, steady, coefficient))
@@ -324,10 +312,10 @@ def _(traction_model, race, sizes, ring, y, first, rollers, scratch, count):
 
 @outer_block.body(TractionSurface)
 def _(traction_model, race, sizes, ring, y, first, rollers, scratch, count):
-    radii, bare = radii_in_order(sizes, y), lane_race(race)
+    bare = lane_race(race)
     for i in range(lanes_to_fill(race, count)):
         j = first + i
-        approach = approach_in_lane(bare, 1.0, lane_radius(sizes, radii, j), ring, y, j, rollers)
+        approach = approach_in_lane(bare, 1.0, roller_radius(sizes, j), ring, y, j, rollers)
         keep_approach(scratch.met, i, bare.traction, approach, 1.0, coefficient_of(bare.tangential, y, j))
     look_up(race.traction, scratch.met, 0, count)
     wrenches(bare, bare, scratch.met, scratch.lanes, count)
@@ -352,7 +340,7 @@ def _(traction_model, outer, inner, sizes, outer_ring, inner_ring, scratch, oute
     for i in range(lanes_to_fill(inner, count)):
         side = packed[SIDES + i]
         race, ring = either(side > 0.0, outer, inner), either(side > 0.0, outer_ring, inner_ring)
-        approach = approach_in_lane(race, side, lane_radius(sizes, packed, RADII + i), ring, packed, i, LANES)
+        approach = approach_in_lane(race, side, lane_radius(sizes, packed, i), ring, packed, i, LANES)
         steady = steady_traction(race.tangential, race.traction, approach.slip, approach.load)
         coefficient = packed[COEFFICIENTS + i]
         keep_lane(race.tangential, scratch.lanes, i, race_wrench(race, side, approach, steady, coefficient))
@@ -364,7 +352,7 @@ def _(traction_model, outer, inner, sizes, outer_ring, inner_ring, scratch, oute
     for i in range(lanes_to_fill(inner, count)):
         side = packed[SIDES + i]
         race, ring = either(side > 0.0, bare_outer, bare_inner), either(side > 0.0, outer_ring, inner_ring)
-        approach = approach_in_lane(race, side, lane_radius(sizes, packed, RADII + i), ring, packed, i, LANES)
+        approach = approach_in_lane(race, side, lane_radius(sizes, packed, i), ring, packed, i, LANES)
         keep_approach(scratch.met, i, race.traction, approach, side, packed[COEFFICIENTS + i])
     look_up(outer.traction, scratch.met, 0, outer_count)
     look_up(inner.traction, scratch.met, outer_count, count)

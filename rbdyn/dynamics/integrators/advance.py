@@ -322,7 +322,13 @@ def advance(bearing, control, carry, tally, t_end, sample_step):
     Steps end exactly at ``t_end``. On any other status ``carry`` holds the last good state, and
     ``carry.counts[WORST]`` the component that made it impossible.
     """
-    # Read from their tuples once, since each read counts references atomically.
+    # References to arrays are counted here, in atomic instructions, and nowhere in the steps.
+    return steps_to(bearing, control, carry, tally, t_end, sample_step)
+
+
+@routine
+def steps_to(bearing, control, carry, tally, t_end, sample_step):
+    """``advance`` without references to count."""
     y, k, stage, clock, counts = carry.y, carry.k, carry.stage, carry.clock, carry.counts
     power, loads, scratch, stiffness = carry.power, carry.loads, carry.scratch, carry.stiffness
     work, largest, largest_time, whirl = tally.work, tally.largest, tally.largest_time, tally.whirl

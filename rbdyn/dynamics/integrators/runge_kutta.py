@@ -33,10 +33,13 @@ from rbdyn.dynamics.integrators.advance import DERIVATIVES, EIGENVALUES, FRAME, 
 
 
 @law
-def tableau(pair):
-    """Weights and nodes. Row s weighs the rows before it in the state at which row s is evaluated; the last row makes the new
-    state. Node: time of a row since the start of the step, over its size.
-    """
+def node(pair, s):
+    """Time of row ``s`` since the start of the step, over its size."""
+
+
+@law
+def weight(pair, s, row):
+    """Weight of a row in the state at which row ``s`` is evaluated; the last row makes the new state."""
 
 
 @law
@@ -107,9 +110,14 @@ class DormandPrince(NamedTuple):
     limit: float = 2.0
 
 
-@tableau.body(DormandPrince)
-def _(pair):
-    return PRINCE_WEIGHTS, PRINCE_NODES
+@node.body(DormandPrince)
+def _(pair, s):
+    return PRINCE_NODES[s]
+
+
+@weight.body(DormandPrince)
+def _(pair, s, row):
+    return PRINCE_WEIGHTS[s, row]
 
 
 @mean_rate.body(DormandPrince)
@@ -176,9 +184,14 @@ class Kutta(NamedTuple):
     limit: float = 2.3
 
 
-@tableau.body(Kutta)
-def _(pair):
-    return KUTTA_WEIGHTS, KUTTA_NODES
+@node.body(Kutta)
+def _(pair, s):
+    return KUTTA_NODES[s]
+
+
+@weight.body(Kutta)
+def _(pair, s, row):
+    return KUTTA_WEIGHTS[s, row]
 
 
 @stage_state.body(Kutta)
@@ -299,10 +312,9 @@ def _(pair, refused, bearing, y, k, stage, power, loads, scratch, clock, counts,
     # One loop of a length that the compiler does not know: unrolled, the derivatives would overflow the instruction cache.
     # Only the very first step computes its first row.
     z, rate = roller_count(bearing), clock[FRAME]
-    _, nodes = tableau(pair)
     first = 0 if counts[DERIVATIVES] == 0 else 1
     for s in range(first, pair.last + 1):
-        turn = turn_of(rate, nodes[s] * h)
+        turn = turn_of(rate, node(pair, s) * h)
         stage_state(pair, s, y, k, h, stage)
         to_fixed_axes(turn, z, stage)
         derivative(bearing, stage, s, k, power, loads, scratch)
@@ -378,14 +390,14 @@ def compare_last_stages(pair, k, stiffness, h, inverse_tolerance):
     |eigenvalue| = |difference of rates|/|difference of states| over the tolerances, of the last two stages, which are both at
     the end of the step.
     """
-    last, (weights, _), way = pair.last, tableau(pair), pair.free
+    last, way = pair.last, pair.free
     for i in range(inverse_tolerance.size):
         k[way, i] = 0.0
     for s in range(last):
-        weight = weights[last, s] - weights[last - 1, s]
-        if weight != 0.0:
+        change = weight(pair, last, s) - weight(pair, last - 1, s)
+        if change != 0.0:
             for i in range(inverse_tolerance.size):
-                k[way, i] += weight * k[s, i]
+                k[way, i] += change * k[s, i]
     rates = places = 0.0
     for i in range(inverse_tolerance.size):
         rate = (k[last, i] - k[last - 1, i]) * inverse_tolerance[i]
