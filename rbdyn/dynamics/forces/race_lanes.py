@@ -71,11 +71,12 @@ FORCE_X, FORCE_Y, ROLLER_MOMENT, RING_MOMENT, LOAD, TRACTION, ROLLING, DAMPING, 
 )
 # Where the rows between the loops of a law with a table begin: the fields of ``RaceApproach``, side and traction
 # coefficient, the place in the table, and four coefficients for each lane in turn.
-INPUTS = 20
+INPUTS = 16
 (
     NX, NY, INVERSE, SLOPE, LEAN, MET_LOAD, STIFFNESS, MET_DAMPING, ROLLER_LEVER, RING_LEVER, SLIP, ENTRAINMENT,
-    SIDE, COEFFICIENT, ALONG, ACROSS, CUBIC, _, _, _,
+    SIDE, COEFFICIENT, ALONG, ACROSS,
 ) = range(0, INPUTS * LANES, LANES)  # fmt: skip
+CUBIC = INPUTS * LANES
 
 
 class OnRing(NamedTuple):
@@ -95,7 +96,7 @@ class Scratch(NamedTuple):
 
     packed: NDArray[np.float64]  # ((ROLLER_STATES + 3) * LANES,)
     lanes: NDArray[np.float64]  # (OUTPUTS * LANES,)
-    met: NDArray[np.float64]  # (INPUTS * LANES,)
+    met: NDArray[np.float64]  # ((INPUTS + 4) * LANES,)
     roller: NDArray[np.int64]  # (LANES,) number of each packed roller
     gap: NDArray[np.float64]  # (rollers,) gap of each in its pocket [m], or less its contact load there [N]
     touching: NDArray[np.int64]  # (rollers,) numbers of those that touch theirs
@@ -106,7 +107,7 @@ def scratch(rollers: int) -> Scratch:
     return Scratch(
         np.ones((ROLLER_STATES + 3) * LANES),
         np.empty(OUTPUTS * LANES),
-        np.ones(INPUTS * LANES),
+        np.ones((INPUTS + 4) * LANES),
         np.zeros(LANES, np.int64),
         np.empty(rollers),
         np.zeros(rollers, np.int64),
