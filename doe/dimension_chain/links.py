@@ -131,16 +131,16 @@ class Link(Strict):
     """Whether the allocation keeps the stated tolerance of this link. It matters where all links have deviations; if some
     have none, stated deviations always stay."""
     position: Position = "unilateral"
-    """Position of an allocated tolerance: on one side, so that it can only shorten the closing link, on both sides, or by a
-    letter of ISO 286."""
+    """Position of an allocated tolerance. unilateral: on one side, so that it can only shorten the closing link. symmetric: on
+    both sides. Otherwise: a letter of ISO 286."""
     cost: Cost | None = None
     """Cost of the tolerance."""
     press_fit: PressFit | None = None
-    """Makes the link the change of a diameter by a press fit."""
+    """Press fit whose change of a diameter is the link."""
     thermal_growth: ThermalGrowth | None = None
-    """Makes the link the growth of another by temperature."""
+    """Thermal growth of another link, which is this link."""
     expression: str | None = None
-    """Makes the link an expression of links before it."""
+    """Expression of earlier links whose value is the link."""
 
     @property
     def is_dimension(self) -> bool:
@@ -162,22 +162,22 @@ class Allocate(Strict):
     """Allocation of tolerances."""
 
     method: Literal["equal", "iso286", "cost"] = "equal"
-    """Rule of the allocation: equal tolerances, in proportion to the tolerance units of ISO 286 (for its grades: grades =
-    true), or at least cost."""
+    """Rule of the allocation. equal: equal tolerances. iso286: in proportion to the ISO 286 tolerance units (for its grades:
+    grades = true). cost: least cost."""
     mode: Mode = "worst_case"
     """Criterion within the limits: the worst case, the root sum square, or target_yield of the assemblies."""
     grades: bool = False
     """Whether each tolerance is narrowed to a grade of ISO 286."""
     spend_slack: bool = False
-    """Whether grades are widened as far as the limits allow, first where the cost curves save most or, without curves, the
-    finest grade."""
+    """Whether grades are widened as far as the limits allow. The first is the grade whose cost curve saves most or, without
+    curves, the finest."""
     target_yield: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.9973
     """Share of the assemblies that mode = "yield" keeps within the limits; 3 sigma."""
     adjust: str | None = None
     """Part whose nominal is moved. Default: the first that is not fixed, if possible with a positive coefficient."""
     resolution_mm: Annotated[float, Field(ge=0.0, le=1.0)] = 0.001
-    """Resolution of the drawing, to which nominals and deviations of allocated parts are rounded, so that the closing link stays
-    within its limits; 0 leaves them unrounded. Stated deviations are never rounded."""
+    """Resolution of the drawing, to which nominals and deviations of allocated parts are rounded. The closing link stays
+    within its limits. 0 leaves the sizes unrounded. Stated deviations are never rounded."""
 
 
 class MonteCarlo(Strict):

@@ -187,7 +187,7 @@ class Front(Strict):
     draws: Annotated[int, Field(ge=100, le=100000)] = 1000
     """Random draws of the surfaces for the front's uncertainty."""
     tolerance_aware: Literal["none", "worst_case", "quantile"] = "none"
-    """A second front, of points within the factors' tolerances: by the worst case or by a quantile of the parts."""
+    """Second front that allows for the factors' tolerances, by the worst case or by a quantile of the parts."""
     quantile: Annotated[float, Field(gt=0.5, lt=1.0)] = 0.95
     """Quantile of a tolerance-aware front."""
     distribution: Literal["normal", "uniform"] = "normal"
@@ -204,7 +204,7 @@ class Adaptive(Strict):
     extend: bool = True
     """Whether the design region grows where the front lies at its bound, up to the factors' "allowed" ends."""
     least_clearance_um: Annotated[float, Field(ge=-1000.0, le=1000.0)] = 0.0
-    """Least diametral clearance of the bearing in operation, mounted, hot and at speed, wherever the region grows; below 0 it is
+    """Least diametral clearance in operation (mounted, hot and at speed) wherever the region grows; below 0 the bearing is
     preloaded. The least guide clearance follows from the scene, by the floor of the land's film."""
     seed: Annotated[int, Field(ge=0)] = 1
     """Seed of the search and its runs."""

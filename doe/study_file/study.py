@@ -70,7 +70,7 @@ class Fitted(Strict):
     """Fit of a surface to a response."""
 
     model: Model = "quadratic"
-    """Terms of the surface: "interaction" has products of two factors, "pure_quadratic" squares, "quadratic" both; "reduced"
+    """Terms of the surface. "interaction" has products of two factors, "pure_quadratic" squares, "quadratic" both; "reduced"
     keeps the significant quadratic terms, with their hierarchy."""
     transform: Literal["none", "box_cox"] | Annotated[float, Field(ge=-5.0, le=5.0)] = "none"
     """Transform of Box and Cox before the fit: none, the recommended one, or one with this exponent."""
@@ -117,10 +117,10 @@ class Confirmation(Strict):
 
 
 class Reference(Strict):
-    """A published table of the same design to compare with."""
+    """Published table of this design, to compare with."""
 
     file: str
-    """The published table, next to the study."""
+    """Name of the published table, relative to the folder of the study."""
     label: str
     """Name of the source."""
     why: dict[str, str] = {}
@@ -143,11 +143,11 @@ class StudyFile(Consistent):
     limits: OtherLimits = OtherLimits()
     """Limits on the class of the cage: limits.cage.verdict = "held|circling"."""
     design: Design = Design()
-    """The design of the runs."""
+    """Experimental design of the runs."""
     front: Front = Front()
-    """The search on the surfaces."""
+    """Search of the Pareto front on the response surfaces."""
     adaptive: Adaptive = Adaptive()
-    """The search with emulators, with --adaptive."""
+    """Search with emulators, used with --adaptive."""
     robust: Robust = Robust()
     """Comparison of the designs over unknown inputs, with --robust or if this table is present."""
     uncertain: Uncertain | None = None
@@ -161,7 +161,7 @@ class StudyFile(Consistent):
     chain: list[StudyChain] = []
     """Dimension chains whose closing links are clearances of the selected design."""
     reference: Reference | None = None
-    """A published table of the same design to compare with."""
+    """Published table of this design, to compare with."""
 
     def faults(self) -> list[str]:
         names, responses = [factor.name for factor in self.factor], [response.name for response in self.response]

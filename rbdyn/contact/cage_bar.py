@@ -52,7 +52,7 @@ class CageSection(NamedTuple):
 
 
 class Elastic(NamedTuple):
-    """Elastic modulus [Pa] and Poisson's ratio."""
+    """Elastic modulus [Pa] and Poisson's ratio of the material."""
 
     modulus: float
     poisson_ratio: float

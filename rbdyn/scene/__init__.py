@@ -116,7 +116,7 @@ class Scene(SceneFile):
     traction: Traction = Traction()
     """Traction of the raceways."""
     model: Laws = Laws()
-    """The laws of each interaction."""
+    """Law of each interaction."""
     damage: Damage = Damage()
     """Inputs of the damage results."""
     verdict: Verdict = Verdict()

@@ -55,11 +55,11 @@ class BallRow(Consistent):
     """Static load rating: the load at which the most loaded ball has a pressure of 4200 MPa (ISO 76). Default: calculated from
     the dimensions by Hertz."""
     inner_shoulder_height_mm: Positive | None = None
-    """Height of the inner-ring shoulder above the groove bottom: half the difference between the catalogue's shoulder diameter
-    and the raceway diameter. Default (estimate): 0.2 ball diameters. Example: a spindle bearing of 15 degrees (pitch 18 mm,
-    balls 4.485 mm, shoulders 15.74 and 21.4 mm) has 0.25 ball diameters inside and 0.12 outside. For contact angles above
-    about 32 degrees the default reaches 20 degrees beyond the contact angle. Effect: a note warns if a contact ellipse runs
-    over the shoulder."""
+    """Height of the inner-ring shoulder above the groove bottom. It is half the difference between the catalogue's shoulder
+    diameter and the raceway diameter. Default (estimate): 0.2 ball diameters. Example: a spindle bearing of 15 degrees (pitch
+    18 mm, balls 4.485 mm, shoulders 15.74 and 21.4 mm) has 0.25 ball diameters inside and 0.12 outside. For contact angles
+    above about 32 degrees the default reaches 20 degrees beyond the contact angle. Effect: a note warns if a contact ellipse
+    runs over the shoulder."""
     outer_shoulder_height_mm: Positive | None = None
     """Height of the outer-ring shoulder above the groove bottom. Default (estimate): 0.2 ball diameters."""
     bore_mm: Positive | None = None
@@ -192,7 +192,7 @@ class MiddleRing(Strict):
     """Condition for the speed of the middle ring. "oil": equal oil friction of both rows (Hu et al., eq 13);
     "torque_balance": equal torque from oil and load after Palmgren, which needs [lubricant]."""
     inner_oil_factor: Positive = 3.3
-    """Palmgren's f0 of the inner row, commonly 1.7 for oil mist, 2 for grease, 3.3 for an oil bath and 6.6 for an oil jet."""
+    """Palmgren's f0 of the inner row. Typical: 1.7 for oil mist, 2 for grease, 3.3 for an oil bath and 6.6 for an oil jet."""
     outer_oil_factor: Positive = 3.3
     """Palmgren's f0 of the outer row."""
     tilt: Literal["free", "fixed"] | None = None
@@ -208,11 +208,11 @@ class DoubleDecker(Consistent):
     kind: Literal["double_decker_ball"]
     """Kind of bearing."""
     inner: BallRow
-    """The row on the inner ring."""
+    """Row on the inner ring."""
     outer: BallRow
-    """The row in the outer ring."""
+    """Row in the outer ring."""
     middle: MiddleRing = MiddleRing()
-    """The ring between the rows."""
+    """Ring between the rows."""
 
     def faults(self) -> Iterator[str]:
         below, above = self.inner.raceway_diameters_mm[1], self.outer.raceway_diameters_mm[0]
@@ -307,7 +307,8 @@ class FormErrors(Consistent):
     steps: Annotated[int, Field(ge=8, le=100_000)] = 360
     """Steps in a turn of the inner ring against the outer ring."""
     turns: Annotated[int, Field(ge=1, le=10_000)] = 8
-    """Turns of the inner ring over which runout is computed, since the cage does not return to its place after one turn."""
+    """Turns of the inner ring over which runout is computed. More than one is needed, because the cage does not return to its
+    place after one turn."""
 
     def faults(self) -> Iterator[str]:
         for key in GROOVES:
@@ -383,7 +384,7 @@ class BallModel(Strict):
     """Whether balls have a gyroscopic moment. "unsigned" drops its sign, as many texts do; it is negative for a rotating inner
     ring."""
     light_load_share: Annotated[float, Field(ge=1e-3, le=10.0)] = 0.3
-    """Ratio of the inner contact load to the centrifugal force at which raceway control is complete; below it balls move with
+    """Ratio of the inner contact load to the centrifugal force at which raceway control is complete. Below it balls move with
     the cage. Effect: a smaller ratio allows several orbits of a lightly loaded ball, whose centrifugal force then changes
     faster than its load."""
     friction_limit: Annotated[float, Field(ge=1e-3, le=10.0)] = 0.3

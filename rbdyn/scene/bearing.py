@@ -87,8 +87,8 @@ class Bearing(Consistent):
     """Diametral clearance: outer raceway less inner raceway less twice the roller diameter; negative is a preload. With
     [mounting] it is the clearance before mounting."""
     roller_profile: Literal["cylinder", "crowned", "logarithmic", "lundberg", "table"] = "cylinder"
-    """Drop of the roller towards its ends. "logarithmic" is the reference profile of ISO/TS 16281; "crowned", "lundberg" and
-    "table" each need the key of their name."""
+    """Shape of the roller: its drop towards the ends. "logarithmic" is the reference profile of ISO/TS 16281; "crowned",
+    "lundberg" and "table" each need the key of their name."""
     crown_radius_mm: Positive | None = None
     """Radius of the crown, for roller_profile = "crowned"."""
     lundberg_load_N: Positive | None = None  # noqa: N815
@@ -234,7 +234,7 @@ class Cage(Consistent):
     """Cage and guide land. Clearances are diametral, and with [mounting] those of the drawing."""
 
     guidance: Literal["outer", "inner", "roller"]
-    """Part that guides the cage: a land of the outer ring, a land of the inner ring, or the rollers in their pockets."""
+    """Part that guides the cage: a land of the outer ring, a land of the inner ring, or the rollers."""
     guide_clearance_mm: Annotated[
         Annotated[float, Field(gt=0.0, le=10.0), NotVanishing] | None, Field(validate_default=True)
     ] = None
@@ -244,8 +244,8 @@ class Cage(Consistent):
     mass_g: Annotated[float, Field(ge=0.01, le=1e6)]
     """Mass of the cage."""
     pocket_contact_length_mm: Positive | None = None
-    """Length of the contact between a roller and a pocket wall: the straight part of the wall less both edge breaks. Default:
-    the effective length of the roller for contact and lips, its full length for the film."""
+    """Length of contact between a roller and a pocket wall: the straight part of the wall without edge breaks. Default: the
+    effective length of the roller for contact and lips, its full length for the film."""
     land_diameter_mm: Positive | None = None
     """Diameter of the guide land. Default: the pitch diameter plus (outer) or minus (inner) 2/3 roller diameter, 49.5 and
     40.5 mm for the bearing of Chen et al. 2022."""
@@ -317,9 +317,9 @@ class CustomMaterial(Sparse):
     UNSAVED: ClassVar[Mapping[str, Any]] = {"conductivity_W_mK": None, "heat_capacity_J_kgK": None}
 
     elastic_modulus_GPa: Annotated[float, Field(gt=0.0, le=2000.0), NotVanishing]  # noqa: N815
-    """Young's modulus."""
+    """Young's modulus of the material."""
     poisson_ratio: Annotated[float, Field(ge=0.0, lt=0.5)]
-    """Poisson's ratio."""
+    """Poisson's ratio of the material."""
     density_kg_m3: Annotated[float, Field(ge=100.0, le=30000.0)]
     """Density of the material."""
     thermal_expansion_1e_6_K: Annotated[float, Field(ge=0.0, le=200.0)] = 12.0  # noqa: N815

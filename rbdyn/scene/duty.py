@@ -56,12 +56,12 @@ class DutyPoint(Consistent):
     """Time fraction of this point; the fractions of all points sum to 1. A point of share 0 counts only for worst values and
     limits."""
     set: list[str] = []
-    """Keys that differ from the scene file at this point, as "key=value": operation, temperatures, oil flow; factors and seeds
-    are not allowed."""
+    """Keys that differ from the scene file at this point, as "key=value". You can set operation, temperatures and oil flow,
+    but not factors and seeds."""
     origin: str | None = Field(None, alias="from")
-    """State of the machine when this point begins: "ambient" for a cold machine, or the name of another point for its steady
-    temperatures. Default: this point is steady from the start. Effect: rbdyn simulate --duty and studies follow temperatures
-    and clearances until this point is steady, by [thermal.start]."""
+    """State of the machine when this point begins. Write "ambient" for a cold machine, or the name of another point for its
+    steady temperatures. Default: this point is steady from the start. Effect: rbdyn simulate --duty and studies follow
+    temperatures and clearances until this point is steady, by [thermal.start]."""
 
     def faults(self) -> Iterator[str]:
         if ": " in self.name:

@@ -78,7 +78,8 @@ class Laws(Consistent):
     pocket_fill: Share = 1.0
     """Share of a pocket wall that is covered with oil; 1 is flooded."""
     guide_land: Literal["film", "dry", "off"] = "film"
-    """Force of the guide land on the cage: the film of a short journal bearing and dry contact, dry contact alone, or none."""
+    """Force of the guide land on the cage: oil film and dry contact, dry contact alone, or none. The film is a short journal
+    bearing."""
     land_film_floor_um: Positive = 3.0
     """Film thickness below which the land is in contact: the critical film of ADORE-style inputs."""
     land_fill: Share = 1.0
@@ -99,9 +100,9 @@ class Laws(Consistent):
     bearings correspond to 0.5 to 1.3 (examples/published/friction_totals.py). That factor decreases with speed and viscosity
     and increases with load."""
     open_contact_film: bool = False
-    """Oil film between a raceway and the rollers that do not touch it: rolling resistance and shear of rigid surfaces at the
-    gap (Reynolds' equation). Without lubricant.inlet_distance it is flooded, and drives rollers and cage without any load.
-    With it, one oil layer feeds loaded and open contacts. The layer fills the gap where the oil of the mean loaded inner
+    """Oil film between a raceway and the rollers that do not touch it. Effect: rolling resistance and shear of rigid surfaces
+    at the gap (Reynolds' equation). Without lubricant.inlet_distance it is flooded, and drives rollers and cage without any
+    load. With it, one oil layer feeds loaded and open contacts. The layer fills the gap where the oil of the mean loaded inner
     contact begins: 4 to 26 um under 300 to 2000 N per contact. A wider gap has no film."""
     drag: Literal["cylinder", "off"] = "cylinder"
     """Drag of the rollers in the mixture of oil and air, as of cylinders in cross-flow, or none."""
@@ -177,14 +178,16 @@ class Verdict(Sparse):
     moving_radius: Share = Thresholds.moving_radius
     """Rms radius of the orbit from which a cage circles or is in fast whirl."""
     concentration: Share = Thresholds.concentration
-    """Share of the spectrum of the orbit in its main line from which a cage circles or is in fast whirl."""
+    """Share of the orbit's spectrum in its main line from which a cage circles or is in fast whirl."""
     lowest_rate: Annotated[float, Field(ge=-1e3, le=0.0)] = Thresholds.lowest_rate
-    """Rate of the orbit, over the speed of the cage, below which a cage is in fast whirl; negative against its rotation."""
+    """Rate of the orbit, divided by the cage speed, below which a cage is in fast whirl. Negative rates are against its
+    rotation."""
     highest_rate: Annotated[float, Field(ge=0.0, le=1e3)] = Thresholds.highest_rate
     """Rate of the orbit, over the speed of the cage, above which a cage is in fast whirl. A film on a ring that turns drives cages
     up to half the sum of both speeds, which counts where it is more."""
     forced_band: Share = Thresholds.forced_band
-    """Relative distance from the order of a force (an imbalance, a ring) within which the orbit is forced, and the cage circles."""
+    """Relative distance from the order of a force (an imbalance, a ring) within which the orbit is forced. Then the cage
+    circles."""
     rattling_turnover: Positive | None = Thresholds.rattling_turnover
     """Work of friction and damping in a cage turn, over the energy of its rotation, above which a cage rattles. Below it wanders. No
     value is known: without one a cage that neither holds still nor goes round is not judged."""
@@ -206,9 +209,9 @@ class Numerics(Consistent, Sparse):
     UNSAVED: ClassVar[Mapping[str, Any]] = {"stiffness": True}
 
     method: Literal["auto", "rk45", "rk43", "rosenbrock"] = "auto"
-    """Integrator. rk45: explicit, Dormand-Prince; rk43: explicit, Kutta's 3/8 rule; rosenbrock: linearly implicit, RODAS4, for
-    scenes where stability limits explicit steps. auto: rk43 at rtol 5e-3 and above, rk45 below, unless a trial at the start of a
-    run shows that rosenbrock is cheaper."""
+    """Integrator. rk45: explicit, Dormand-Prince. rk43: explicit, Kutta's 3/8 rule. rosenbrock: linearly implicit, RODAS4, for
+    scenes where stability limits explicit steps. auto: rk43 at rtol 5e-3 and above, rk45 below, unless a trial at the start of
+    a run shows that rosenbrock is cheaper."""
     rtol: Annotated[float, Field(ge=1e-13, le=0.1)] = 1e-2
     """Relative tolerance of a step: the error in approach and speed of a raceway contact at its mean load share. Effect:
     errors at 1e-2 for the bearing of Chen et al. 2022 are impact -0.05 +- 0.12 %, whirl +0.1 +- 0.4 %, loss 0.000 +- 0.008 %.
@@ -216,7 +219,7 @@ class Numerics(Consistent, Sparse):
     turns: Annotated[float, Field(gt=0.0, le=1e6)] = 100
     """Shaft turns that are counted, after discard_turns."""
     discard_turns: Annotated[float, Field(ge=0.0, le=1e6)] | Literal["auto"] = 20.0
-    """Shaft turns before the counted ones, discarded as transient; "auto" detects the transient in the series of the run, at
+    """Shaft turns before the counted ones, discarded as transient. "auto" detects the transient in the series of the run, at
     least one batch."""
     extend: bool = True
     """Double the run until its results have settled, and count its second half. Results have settled when replicates that

@@ -286,10 +286,10 @@ class Traction(Consistent):
     """Traction of the raceways. The defaults are an ADORE-style set for a turbine-engine oil."""
 
     model: Literal["four_constant", "thermal_newtonian", "eyring", "limiting_shear", "coulomb", "off"] = "four_constant"
-    """Law of the traction. four_constant: one curve for all loads, as in Chen et al. 2022, which overestimates the traction of
-    lightly loaded rollers and so under-predicts skidding; thermal_newtonian, eyring, limiting_shear: by pressure and temperature;
-    coulomb: dry. Default: limiting_shear for oils by grade or data sheet, four_constant for MIL-L-7808 and MIL-L-23699,
-    thermal_newtonian for other turbine oils."""
+    """Traction law. four_constant: one curve for all loads, as in Chen et al. 2022, which overestimates the traction of
+    lightly loaded rollers and so underestimates skidding. thermal_newtonian, eyring, limiting_shear: by pressure and
+    temperature. coulomb: dry friction. Default: limiting_shear for oils by grade or data sheet, four_constant for MIL-L-7808
+    and MIL-L-23699, thermal_newtonian for other turbine oils."""
     mu_0: NonNegative = 0.0
     """Traction coefficient at zero slip, of an ADORE-style set for a turbine-engine oil."""
     mu_m: NonNegative = 0.050
@@ -299,7 +299,7 @@ class Traction(Consistent):
     u_m_m_s: Positive = 1.0
     """Slip at which traction is largest."""
     constants: Annotated[tuple[float, float, float, float] | None, BeforeValidator(_four_numbers)] = None
-    """Constants A, B [s/m], C [s/m], D of (A + B u) exp(-C u) + D, instead of mu_0, mu_m, mu_inf and u_m_m_s."""
+    """Constants A, B [s/m], C [s/m], D of (A + B u) exp(-C u) + D. They replace mu_0, mu_m, mu_inf and u_m_m_s."""
     rheology_oil: RheologyOil | None = None
     """Oil of the thermal_newtonian constants of Gupta et al. 1981. Default: lubricant.oil, or MIL-L-23699 for turbine oils without
     constants."""
@@ -310,7 +310,7 @@ class Traction(Consistent):
     largest_shear_ratio: Share = 0.1
     """Largest ratio of shear stress to pressure for thermal_newtonian and eyring, whose stress is unbounded above 1.5 GPa."""
     elasticity: bool = False
-    """Tangential elasticity of the raceway contacts: a spring as stiff as the contact in approach acts before traction follows
+    """Tangential elasticity of the raceway contacts. A spring as stiff as the contact in approach acts before traction follows
     the steady law. Effect: contacts with a steep traction curve need no implicit method, and most bearings of "rbdyn new" run
     five to ten times faster. Loss, slip and whirl do not change, and impacts do not within their errors: 144.7 +- 4.3 N
     compared with 144.5 +- 2.6 N for the NU 210 at its defaults (24 and 60 replicates)."""
@@ -320,8 +320,9 @@ class Traction(Consistent):
     boundary_friction: NonNegative = 0.1
     """Friction coefficient of asperities, for friction = "mixed"."""
     asperity_b: Positive = 2.32
-    """Constant b of the asperities' share exp(-b Lambda^c) for raceways of a tapered roller bearing with a composite roughness of
-    0.16 um (Lubricants 11, 2023, 369, Table 4). It depends on the surface finish: Zhou and Hoeprich state no general values."""
+    """Constant b of the asperities' share exp(-b Lambda^c). Default: raceways of a tapered roller bearing with a composite
+    roughness of 0.16 um (Lubricants 11, 2023, 369, Table 4). The constant depends on the surface finish: Zhou and Hoeprich
+    state no general values."""
     asperity_c: Positive = 0.97
     """Constant c of the asperities' share exp(-b Lambda^c), from the same source."""
     coulomb: NonNegative = 0.1

@@ -69,8 +69,9 @@ class Thermal(Sparse):
     ambient_C: OilCelsius = 20.0  # noqa: N815
     """Temperature around housing and shaft; ISO 15312 has 20."""
     surface_factor: Positive = 1.0
-    """Factor on the heat transfer from all surfaces in the bearing to the oil, which is calculated as for a flat plate in pure
-    oil. Formulas for the cavity of a bearing differ by a factor of ten: adjust it to one measured temperature."""
+    """Factor on the heat transfer from all surfaces in the bearing to the oil. The heat transfer is calculated as for a flat
+    plate in pure oil. Formulas for the cavity of a bearing differ by a factor of ten: adjust it to one measured
+    temperature."""
     housing_factor: NonNegative = 1.0
     """Factor on the heat that the housing removes, 0.016 W/mm2 of its seat at 50 K above ambient as in ISO 15312. A
     plummer block in moving air removes more, a hot housing nothing (0)."""
@@ -81,7 +82,7 @@ class Thermal(Sparse):
     """Factor on the heat that bath oil loses through the housing walls: 150 W/m2K, based on the outer-ring seat. It counts
     with lubricant.supply = "bath" only."""
     film_share_to_oil: Annotated[float, Field(ge=0.0, le=1.0)] = 0.3
-    """Share of the heat of films and of rolling resistance that the oil takes along; both surfaces get the rest in halves. Oil passes
+    """Share of the heat of films and rolling resistance that goes into the oil. Each surface gets half of the rest. Oil passes
     a contact in 1e-5 s, and heat is conducted to the walls in 1e-7 s, so little stays in the oil."""
     contact_factor: Positive = 1.0
     """Factor on the heat conducted through the raceway contacts, which follows from conductivity and heat capacity of the

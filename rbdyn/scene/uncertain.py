@@ -67,12 +67,12 @@ class Law(Strict):
     """Distribution of an input: one unknown true value, or a value that varies from case to case."""
 
     law: Literal["uniform", "log_uniform", "normal", "choices"]
-    """Distribution: uniform or log_uniform between low and high; normal with mean and sd,
-    optionally truncated at low and high; or choices among values."""
+    """Distribution of the input. uniform, log_uniform: between low and high. normal: with mean and sd, optionally truncated at
+    low and high. choices: among values."""
     low: Number | None = None
-    """Lowest value."""
+    """Lowest value of the input."""
     high: Number | None = None
-    """Highest value."""
+    """Highest value of the input."""
     mean: Number | None = None
     """Mean, for law = "normal"."""
     sd: Positive | None = None
@@ -171,8 +171,8 @@ class Uncertain(Strict):
     """Keys that differ from the scene file in the runs of input sets, as key=value. Your list replaces these keys and keeps
     the other defaults. A key in this list is fixed: it has no distribution and no documented range."""
     sample: str | None = None
-    """CSV file of a posterior sample, one row for each input set, with keys as columns, which replaces the laws of these keys. The
-    path is relative to the folder of this file."""
+    """CSV file of a posterior sample, one row per input set, with keys as columns. It replaces the distributions of these
+    keys. The path is relative to the folder of this file."""
 
     @property
     def laws(self) -> Mapping[str, Law]:

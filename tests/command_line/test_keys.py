@@ -1,6 +1,7 @@
 """``rbdyn keys`` and ``doe keys``: every key described, and a schema that accepts what the commands accept."""
 
 import json
+import re
 import tomllib
 from pathlib import Path
 
@@ -40,9 +41,13 @@ def is_scene(path):
 
 @pytest.mark.parametrize("model", _models([*SCENES.values(), StudyFile, Chains]), ids=lambda model: model.__name__)
 def test_every_key_says_what_it_means(model):
-    """Command line: no key without a whole sentence of its own."""
+    """Command line: each key says in a short first sentence what it is; then its default, then its effect."""
     for name, text in descriptions(model).items():
         assert text.endswith((".", ".)")) and len(text.split()) > 1 and text.rstrip(".") != name, name
+        first = re.split(r"(?<=[.?])\s", text)[0]
+        assert len(re.findall(r"\S*[A-Za-z]\S*", first)) <= 20 and not first.startswith(("The ", "Its ", "Makes ")), f"{name}: {first}"
+        stated = re.findall(r"\b(Default|Effect)\b[^:.]*:", text)
+        assert stated in ([], ["Default"], ["Effect"], ["Default", "Effect"]), f"{name}: {text}"
 
 
 # Lists of measured and of quoted figures are inputs of scripts alone.
