@@ -94,8 +94,7 @@ class Difference(Record):
     difference: float | None = shown("B - A", cell=lambda figure: figure.words)
     error: float | None = written("half width of the 95 % interval of this difference alone", unit="of the figure")
     error_together: float | None = written(
-        "half width that holds together with those of the other figures of the bearing, or of the parts",
-        unit="of the figure",
+        "half width that holds jointly for all results of the bearing, or of the parts", unit="of the figure"
     )
     verdict: str = shown(
         "difference",
@@ -117,7 +116,7 @@ class Difference(Record):
 
 
 DIFFERENCES: tuple[Column[tuple[str, Difference]], ...] = (
-    Column("figure", label, at=0, meaning="name of the figure, its unit at the end"),
+    Column("figure", label, at=0, meaning="name of the result, its unit at the end"),
     *within(1, columns_of(Difference)),
     Column("percent", screen=False, unit="%", at=(1, "percent"), meaning="difference over the size of A"),
 )
@@ -125,7 +124,7 @@ DIFFERENCES: tuple[Column[tuple[str, Difference]], ...] = (
 
 def difference_sheet(figures: Mapping[str, Difference]) -> Sheet[tuple[str, Difference]]:
     """A row a figure."""
-    content = "One row per figure of `rbdyn compare`, those of the parts last."
+    content = "One row per result of `rbdyn compare`, those of the parts last."
     return Sheet("", DIFFERENCES, tuple(figures.items()), file="differences.csv", content=content)
 
 
@@ -201,7 +200,7 @@ def compare(
     if kinds[0] != kinds[1]:
         raise InputError(
             [
-                f"A is a bearing with {kinds[0]} and B one with {kinds[1]}: they have no figures in common; compare two of one kind"
+                f"A is a bearing with {kinds[0]} and B one with {kinds[1]}: they have no results in common; compare two of one kind"
             ]
         )
     if isinstance(sources[0], Scene | BallScene) and sources[0] == sources[1]:

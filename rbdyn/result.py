@@ -91,10 +91,10 @@ def full_status(result: Any) -> str:
 
 def figure_sheet(figures: Mapping[str, Quantity]) -> Sheet[tuple[str, Quantity]]:
     """A row a figure by its name, or its words."""
-    name: Column[tuple[str, Quantity]] = Column("figure", at=0, meaning="name of the figure, its unit at the end")
+    name: Column[tuple[str, Quantity]] = Column("figure", at=0, meaning="name of the result, its unit at the end")
     columns = (name, *within(1, columns_of(Quantity)))
     return Sheet(
-        "", columns, tuple(figures.items()), file="figures.csv", content="One row per figure of `rbdyn simulate`."
+        "", columns, tuple(figures.items()), file="figures.csv", content="One row per result of `rbdyn simulate`."
     )
 
 
@@ -165,7 +165,7 @@ class SavedRecord(Record):
         return read_record(path, cls.FORMAT, cls.WHAT, cls.from_dict)
 
 
-# Radius of the cage's orbit over its radial play below which the cage only jitters. From the example and five catalogue
+# Radius of the cage's orbit over its radial clearance below which the cage only jitters. From the example and five catalogue
 # bearings at 1700 to 12000 rpm, 0.1 to 10 % of C and all guidances: cages that a film keeps at one place move by 0.01 to 0.1 of
 # their play, and none goes round its guide (whirl rate within 0.015 of 0). Those that rollers throw about move by 0.1 to 0.36.
 # The two that go round (rates of 0.15 and 0.84 of the cage speed) move by 0.51 and 0.25.
@@ -219,7 +219,7 @@ START_FIGURES = {
         "time from which on the temperatures of the warming machine stay within 1 K of the last ones",
     ),
     "start_race_pressure_MPa": StartFigure(
-        PRESSURE, PRESSURE, "largest pressure of the races where the radial clearance is least while the machine warms"
+        PRESSURE, PRESSURE, "largest raceway pressure where the radial clearance is least while the machine warms"
     ),
     "start_share_of_seizure": StartFigure(
         SEIZING, SEIZING, "share of the input sets of the heat balance in which a part seizes while the machine warms"
@@ -262,7 +262,7 @@ class StartResult(Record, kw_only=True):
     - ``axial_load_N`` and ``contact_pressure_MPa``: largest ones of a ball bearing, which has no cage here, and no ``moments``
     - ``temperature_difference_K``: largest lead of the inner ring over the outer one; ``time_to_steady_s``: from which on all
       temperatures stay within 1 K of the last ones, None without a steady state
-    - ``race_pressure_MPa``: largest pressure of the races where the radial clearance is least, None where that is impossible
+    - ``race_pressure_MPa``: largest pressure of the raceways where the radial clearance is least, None where that is impossible
     - ``quantities``: figures of a roller bearing by ``START_FIGURES``, with errors
     - ``ranges``: 5, 50 and 95 % of figures over the ``inputs``, ``share_of_seizure`` of the input sets, and
       ``share_with_minimum`` of them by clearance; without a minimum its time is 0 or that to steady
@@ -401,7 +401,7 @@ class SimulationResult(Brief, SavedRecord):
 
     @property
     def cage_orbit_radius_share(self) -> Quantity | None:
-        """Radius of the cage's orbit over its radial play; None where nothing guides the cage."""
+        """Radius of the cage's orbit over its radial clearance; None where nothing guides the cage."""
         return self.figures.get("cage_orbit_radius_share")
 
     @property

@@ -156,7 +156,7 @@ def limits_of(texts: Sequence[str]) -> Limits:
     for text in texts:
         where, match = f"--limit {one_line(text, LONGEST_NAME)}", LIMIT.fullmatch(text)
         if match is None:
-            faults.append(f'{where}: is no limit; write "NAME<=VALUE" or "NAME>=VALUE" in quotes')
+            faults.append(f'{where}: is not a limit; write "NAME<=VALUE" or "NAME>=VALUE" in quotes')
             continue
         name, sign, number = match.groups()
         if name == CAGE_CLASS:

@@ -75,7 +75,7 @@ def _syntax_tree(text: str) -> ast.expr:
     try:
         tree = ast.parse(text.strip(), mode="eval").body
     except (SyntaxError, ValueError, RecursionError, MemoryError):
-        raise MethodError("is no arithmetic expression; write it like 0.5*(bore - shaft)") from None
+        raise MethodError("is not an arithmetic expression; write it like 0.5*(bore - shaft)") from None
     level: list[ast.AST] = [tree]
     for _ in range(DEEPEST + 1):
         level = [child for node in level for child in ast.iter_child_nodes(node)]

@@ -104,7 +104,7 @@ def _reference_faults(chain: Chain) -> list[str]:
         if _sentence(partial(used_links, link)) is None:
             names = used_links(link)
             sentences += [
-                f'link "{link.name}": uses "{name}", which is no link before it; name one of '
+                f'link "{link.name}": uses "{name}", which is not an earlier link; name one of '
                 f"{', '.join(before) or 'those placed before it'}"
                 for name in names
                 if name not in before
@@ -128,7 +128,7 @@ def _selective_faults(chain: Chain) -> list[str]:
     pair = {"first": chain.selective.first, "second": chain.selective.second}
     alien = {key: name for key, name in pair.items() if name not in parts}
     sentences = [
-        f'selective.{key} = "{name}": is no part; name one of {", ".join(parts)}' for key, name in alien.items()
+        f'selective.{key} = "{name}": is not a part; name one of {", ".join(parts)}' for key, name in alien.items()
     ]
     if pair["first"] == pair["second"]:
         sentences.append(f'selective.second = "{pair["second"]}": is the first part too; name another')
@@ -142,7 +142,7 @@ def _allocation_faults(chain: Chain, free: list[str]) -> list[str]:
     if adjust is not None and adjust not in free:
         if any(link.name == adjust for link in chain.link):
             return [f'allocate.adjust = "{adjust}": is fixed; name one of {", ".join(free)}']
-        return [f'allocate.adjust = "{adjust}": is no link; name one of {", ".join(free)}']
+        return [f'allocate.adjust = "{adjust}": is not a link; name one of {", ".join(free)}']
     return []
 
 

@@ -385,12 +385,12 @@ def describe_known_variance(variance: KnownVariance, alpha: float) -> list[str]:
     sentences = [
         f"chi-square of the residual over the known variance is {variance.chi_square:.4g} on {variance.df} degrees of freedom"
         f". Standard errors come from the residual and are "
-        f"{share:.3g} times those of the known variance alone."
+        f"{share:.3g} times the standard errors by the known variance alone."
     ]
     f, p = variance.pure_error_ratio, variance.pure_error_p
     if f is None or p is None:
         return sentences
-    scatter = f"the variance of repeated runs is {f:.3g} times that of their replicates ({p_text(p)})"
+    scatter = f"the variance of repeated runs is {f:.3g} times the variance of their replicates ({p_text(p)})"
     if p > alpha:
         return [*sentences, f"{scatter}: the two agree, so the errors of the runs are reliable."]
     cause = (

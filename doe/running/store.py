@@ -113,7 +113,7 @@ PATIENCE_S = 30.0
 # Fixes by the error code of sqlite.
 PLACE = "make sure that its folder exists and that both can be written, or name another folder"
 FIXES = {
-    sqlite3.SQLITE_NOTADB: "it is no database; move it away or name another folder",
+    sqlite3.SQLITE_NOTADB: "it is not a database; move it away or name another folder",
     sqlite3.SQLITE_CORRUPT: "it is damaged; move it away, its runs are then run again",
     sqlite3.SQLITE_BUSY: "another process holds it; start again when that has ended",
     sqlite3.SQLITE_CANTOPEN: PLACE,

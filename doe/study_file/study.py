@@ -420,7 +420,7 @@ def study_of_table(path: Path, factors: list[str], responses: list[str], model: 
     sheet = done_rows(read_sheet(path))
     has = f"it has {listed(sheet.places)}"
     refuse(
-        f"--{kind} {one_line(name)}: is no column of {path}; {has}"
+        f"--{kind} {one_line(name)}: is not a column of {path}; {has}"
         for kind, names in (("factor", factors), ("response", responses))
         for name in names
         if name not in sheet

@@ -176,7 +176,7 @@ class Obstacles(Record):
             if names
             else "The best point lies within the bounds of all factors, so that a wider region does not help by the surfaces"
         )
-        return f"{why}: relax the limits, or change what is no factor."
+        return f"{why}: relax the limits, or change a value that is not a factor."
 
 
 def obstacles_of(
@@ -445,7 +445,7 @@ def _reason(forecast: Forecast, rival: Confirmed, pick: Confirmed) -> str:
         )
     here, there = forecast.at(rival.point), forecast.at(pick.point)
     if here is None and forecast.searched is not None:
-        return f"but it is no point of the {forecast.searched.name} front, from which the pick is chosen"
+        return f"but it is not a point of the {forecast.searched.name} front, from which the pick is chosen"
     where = " at the ends of its tolerances" if forecast.with_tolerances else ""
     if here is not None and there is not None:
         if there.keeps and not here.keeps:

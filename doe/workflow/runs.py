@@ -206,9 +206,9 @@ def _distinct_notes(notes: Sequence[Notes]) -> list[Note]:
     for group in texts:
         some, alone = f"in {len(group)} of {len(notes)} runs", len(set(group)) == 1
         if len(group) < len(notes) and group[0].level == DANGER:
-            distinct.append(Note("corner", f"{group[0]} ({some}{'' if alone else '; figures of the first'})"))
+            distinct.append(Note("corner", f"{group[0]} ({some}{'' if alone else '; values of the first'})"))
         else:
-            distinct.append(group[0] if alone else group[0].about(f"{some}; figures of the first"))
+            distinct.append(group[0] if alone else group[0].about(f"{some}; values of the first"))
     return distinct
 
 

@@ -95,7 +95,7 @@ class WithoutGain(Record):
 
 
 class FactorTolerance(Record):
-    """The widest tolerance of a factor, as a half width, with the share of parts that keep what the study asks.
+    """The widest tolerance of a factor, as a half width, with the share of parts that satisfy the requirements of the study.
 
     ``interval``: of that share with the errors of the surfaces. ``grade``, ``parts``: of ISO 286; None and empty where none is
     listed. ``without_limiting_gain`` is None where no grade is too fine or no gain limits.

@@ -177,7 +177,7 @@ def _case_of(path: Path, overrides: Sequence[str], figures: Sequence[str] = ()) 
     case = read_case(path, OUTPUTS, overrides)
     names = responses_of(case.scene.thermal is not None)
     refuse(
-        f"--figure {one_line(name, LONGEST_NAME)}: no figure of this scene; choose one of {', '.join(names)}"
+        f"--figure {one_line(name, LONGEST_NAME)}: not a result of this scene; choose one of {', '.join(names)}"
         for name in figures
         if name not in names
     )
@@ -198,7 +198,7 @@ def _varying(case: Case, sets: Sets, idle: dict[str, float]) -> tuple[Case, Sets
 
 def _idle_notes(idle: Mapping[str, float]) -> list[Note]:
     return [
-        Note("remark", f"{name}: is {value:.5g} in every input set, for no unknown input changes it")
+        Note("remark", f"{name}: is {value:.5g} in every input set, because no unknown input changes it")
         for name, value in idle.items()
     ]
 

@@ -136,7 +136,7 @@ def conclusion(rows: list[Row], repeats: int) -> str:
     low, high = POOLED
     share, scatter = pooled(rows), 1.96 * math.sqrt(0.95 * 0.05 / repeats)
     narrow = [f"{one.figure} {one.covered:.2f}" for one in rows if one.covered < LOWEST]
-    over_all = f"Pooled over the figures {share:.3f} ({with_error(0.95, scatter)} for a sound interval of one figure)"
+    over_all = f"Pooled over the results {share:.3f} ({with_error(0.95, scatter)} for a sound interval of one result)"
     if narrow:
         return f"{over_all}; too narrow (below {LOWEST:.2f}): {', '.join(narrow)}."
     if share > high:

@@ -198,7 +198,7 @@ def ending(scene: Scene, case: str, assignments: Sequence[str]) -> Ending:
 
 def _judge(figures: Mapping[str, float], rtol: float, tightened: bool) -> tuple[str, str]:
     if not all(math.isfinite(figure) for figure in figures.values()):
-        return OPEN, "a figure is not finite"
+        return OPEN, "a result is not finite"
     if (gap := figures["power_gap"]) > LARGEST_GAP:
         return OPEN, f"power balance closes only to {100.0 * gap:.2g} %, even at rtol {rtol:g}"
     if tightened:

@@ -414,7 +414,7 @@ def plain_number(text: str, unit: str = "", fault: Callable[[float], str | None]
         value, advice = float(text.replace(",", ".") if comma else text), comma
     except ValueError:
         if not typed or not factor:
-            raise MethodError(f"is no number; write a plain number{f' in {unit}' if unit else ''}") from None
+            raise MethodError(f"is not a number; write a plain number{f' in {unit}' if unit else ''}") from None
         value = factor * float(typed[1].replace(",", "."))
         advice = f"has a unit; write {value:.10g}"
     if sentence := fault(value) or advice:

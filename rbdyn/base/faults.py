@@ -265,7 +265,7 @@ def read_text(path: Path) -> str:
 def not_utf_8(path: Path, data: bytes, error: UnicodeDecodeError) -> InputError:
     """The fault of a file that is no UTF-8, with the first such byte."""
     line, byte = data.count(b"\n", 0, error.start) + 1, error.object[error.start]
-    return InputError([f"{path}: cannot be read (line {line}: byte 0x{byte:02x} is no UTF-8); save the file as UTF-8"])
+    return InputError([f"{path}: cannot be read (line {line}: byte 0x{byte:02x} is not UTF-8); save the file as UTF-8"])
 
 
 def read_toml(path: Path | str) -> dict[str, Any]:

@@ -71,7 +71,7 @@ def place_of_file(path: Path | str) -> Path:
     if path.is_dir() or not path.name:
         raise InputError([f"{path}: is a folder; name a file in it"])
     if not path.parent.is_dir():
-        raise InputError([f"{path}: there is no folder {path.parent}; make it first"])
+        raise InputError([f"{path}: missing folder {path.parent}; make it first"])
     return path
 
 

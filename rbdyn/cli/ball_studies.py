@@ -190,7 +190,7 @@ def race_limits(scene: BallScene, tolerance_class: str, target_yield: float, see
     row = _single(scene, "race-limits")
     if tolerance_class not in get_args(ToleranceClass):
         classes = ", ".join(get_args(ToleranceClass))
-        raise InputError([f"--race-limits {tolerance_class}: is no tolerance class; choose one of {classes}"])
+        raise InputError([f"--race-limits {tolerance_class}: is not a tolerance class; choose one of {classes}"])
     if row.bearing.bore_mm is None:
         raise InputError(["bearing.bore_mm: missing; tolerance classes go by the bore, add it"])
     try:
@@ -271,7 +271,7 @@ def limit_sheet(record: Mapping[str, Any]) -> Sheet[Mapping[str, Any]]:
     rows = [
         {"race": race, **{name: record.get(f"{race}_{name}") for name in ("roundness_um", "sway_um")}} for race in RACES
     ]
-    content = "One row per race, of `rbdyn ball --race-limits`."
+    content = "One row per raceway, of `rbdyn ball --race-limits`."
     return Sheet("", columns, rows, file="race_limits.csv", content=content)
 
 
@@ -395,7 +395,7 @@ def _row_sentences(row: RowReport) -> list[str]:
             film = f", film {contact['central_film_um']:.3g} µm, lambda {contact['lambda_ratio']:.2g}"
         axes = " x ".join(shown(1e3 * contact[f"semi_{axis}_mm"], 3) for axis in ("major", "minor"))
         pressed = f"up to {contact['load_N']:.4g} N, {row.max_stress_MPa[race]:.0f} MPa"
-        sentences.append(f"{race} race: {pressed} on an ellipse of semi-axes {axes} µm{_edge(contact)}{film}")
+        sentences.append(f"{race} raceway: {pressed} on an ellipse of semi-axes {axes} µm{_edge(contact)}{film}")
     life = row.life
     if life["L10_Mrev"] is not None:
         hours = f", {shown(life['L10_h'], 3)} h" if life["L10_h"] is not None else ""

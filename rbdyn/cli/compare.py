@@ -93,7 +93,7 @@ MOST_NAMED = 8
 def statement(found: "Comparison") -> str:
     """The significant changes from A to B in words, then the other figures."""
     if not _in_common(found):
-        return "There are no figures to compare."
+        return "No results can be compared."
     if all(one.verdict == "equal" for one in found.figures.values()):
         return f"No {'' if found.inputs else 'input and no '}figure differs."
     scatter = sum(bool(one.error_together) for one in found.figures.values())

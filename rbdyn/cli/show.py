@@ -54,7 +54,7 @@ class Request:
         if not other:
             return dangers
         change = ", ".join(f"{name} {then.get(name, 'unknown')} then and {now[name]} now" for name in other)
-        sentence = f"this motion may differ from that of the result, which was computed with other versions: {change}"
+        sentence = f"this motion may differ from the result's motion, which was computed with other versions: {change}"
         return *dangers, Note("versions", sentence)
 
 
@@ -223,7 +223,7 @@ def _figures(record: dict[str, Any]) -> list[tuple[str, str]]:
         rows.append((f"largest load, {name.replace('_', ' ')} [N]", when))
     for name, race in record["races"].items():
         worst = f"{race['pressure_GPa']:.3g} GPa, {race['slip_m_s']:.3g} m/s, {race['pressure_velocity_MPa_m_s']:.3g} MPa m/s"
-        rows.append((f"largest pressure, slip, their product, {name} race", worst))
+        rows.append((f"largest pressure, slip, their product, {name} raceway", worst))
     life = record["life"]
     if life["L10_h"] is not None:
         hours = f"{shown(life['L10_h'], 3)} h, {shown(life['L10_Mrev'], 3)} million turns"

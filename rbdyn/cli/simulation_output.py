@@ -172,7 +172,7 @@ def _error(error: float | None) -> str:
 
 def _run_sentence(result: SimulationResult) -> str:
     return (
-        f"race loads up to {result.loads['max_inner_N']:.0f} N (inner), {result.loads['max_outer_N']:.0f} N (outer); power "
+        f"raceway loads up to {result.loads['max_inner_N']:.0f} N (inner), {result.loads['max_outer_N']:.0f} N (outer); power "
         f"balance closes to {100.0 * result.power_balance['relative_gap']:.2g} %; {counted(result.replicates, 'replicate')}, seed "
         f"{result.seed}; {result.cost['wall_s']:.2f} s, {result.cost['compile_s']:.1f} s to "
         "load or compile"
@@ -184,7 +184,7 @@ def _race_sentence(race: str, contact: dict[str, float]) -> str:
     if "lambda_ratio" in contact:
         film = f", film {contact['central_film_um']:.2g} µm, lambda {contact['lambda_ratio']:.2g}"
     return (
-        f"{race} race at its largest load: {contact['max_pressure_MPa']:.0f} MPa over {contact['half_width_um']:.0f} "
+        f"{race} raceway at its largest load: {contact['max_pressure_MPa']:.0f} MPa over {contact['half_width_um']:.0f} "
         f"µm each way{film}"
     )
 
@@ -281,7 +281,7 @@ def _start_sentence(start: StartResult) -> str:
         times = start.ranges.get("time_to_steady_s")
         steady = f"steady after {shown(start.time_to_steady_s, 3)} s{f' ({range_ends(times)})' if times else ''}"
     lost = start.radial_um.least.value <= 0.0 and start.race_pressure_MPa is not None
-    pressure = f"; races reach {start.race_pressure_MPa:.0f} MPa without clearance" if lost else ""
+    pressure = f"; raceways reach {start.race_pressure_MPa:.0f} MPa without clearance" if lost else ""
     return (
         f"start: inner ring up to {with_error(lead.value, lead.stated_error)} K ({range_ends(spread)}) warmer than the outer ring; "
         f"{steady}{pressure}"
@@ -372,7 +372,7 @@ def _losses(result: SimulationResult) -> list[Block]:
     ]
     losses.append(("all", with_error(result.power_loss_W.value, result.power_loss_W.stated_error), "100 %"))
     losses += [
-        (f"rolling resistance, {race} race alone", shown(power, 3), f"{100.0 * power / whole:.2g} %")
+        (f"rolling resistance, {race} raceway alone", shown(power, 3), f"{100.0 * power / whole:.2g} %")
         for race, power in result.rolling_resistance_W.items()
     ]
     gap = result.power_balance["relative_gap"] * result.power_loss_W.value
@@ -391,7 +391,7 @@ def _target_sentence(target: dict[str, Any]) -> str:
         f"target {100.0 * target['asked']:g} % {'met' if target['met'] else 'not met'} ({reached}) by "
         f"{counted(choice['replicates'], 'replicate')} of {counted(choice['turns'], 'turn')} at rtol "
         f"{choice['rtol']:g}; {cost['rhs_evaluations'] / 1e6:.1f} million right-hand sides, "
-        f"{cost['pilot_rhs_evaluations'] / 1e6:.1f} of them for pilots; the seconds are those of pilots and all runs"
+        f"{cost['pilot_rhs_evaluations'] / 1e6:.1f} of them for pilots; the seconds include pilots and all runs"
     )
 
 
@@ -492,7 +492,7 @@ def simulated_blocks(found: "DutySimulation") -> list[Block]:
         _point_table("Clearances in operation [µm]", found, CLEARANCES),
         *_point_starts(found),
         *duty_blocks(found.points, found.life or {}),
-        Paragraph("" if found.life else f"Life over the duty: unknown, for there is none at {', '.join(lifeless)}."),
+        Paragraph("" if found.life else f"Life over the duty: unknown, because {', '.join(lifeless)} has none."),
     ]
     return with_notes(found.notes, blocks)
 

@@ -27,7 +27,7 @@ def dent_sentence(pressure: float, limit: float, race: str) -> str:
     """Sentence on a ``pressure`` above the ``limit`` [Pa] on the "inner" or "outer" race, with the fix."""
     kind = "rollers" if limit == ROLLERS else "balls"
     return (
-        f"{race} race: dented by {1e-6 * pressure:.0f} MPa, more than the {1e-6 * limit:.0f} MPa of ISO 76; reduce the load or take "
+        f"{race} raceway: dented by {1e-6 * pressure:.0f} MPa, more than the {1e-6 * limit:.0f} MPa of ISO 76; reduce the load or take "
         f"more or larger {kind}"
     )
 
@@ -35,15 +35,15 @@ def dent_sentence(pressure: float, limit: float, race: str) -> str:
 def overload_sentence(pressure: float, limit: float) -> str:
     """Words on a ``pressure`` [Pa] above the shakedown limit of the kind of contact with this ``limit`` by ISO 76."""
     return (
-        f"{1e-6 * pressure:.0f} MPa, above the {1e-6 * SHAKEDOWN[limit]:.0f} MPa up to which a hardened race stays elastic under "
-        "rolling (shakedown), so no figure is that of a bearing; reduce the load"
+        f"{1e-6 * pressure:.0f} MPa, above the {1e-6 * SHAKEDOWN[limit]:.0f} MPa up to which a hardened raceway stays elastic under "
+        "rolling (shakedown), so no result applies to a real bearing; reduce the load"
     )
 
 
 def pressure_notes(pressure: float, limit: float, race: str) -> Notes:
     """A note on a largest ``pressure`` [Pa] that dents a race or is above its shakedown limit; ``limit``: ``BALLS`` or ``ROLLERS``."""
     if pressure > SHAKEDOWN[limit]:
-        return (Note("overload", f"{race} race: overloaded: {overload_sentence(pressure, limit)}"),)
+        return (Note("overload", f"{race} raceway: overloaded: {overload_sentence(pressure, limit)}"),)
     return (Note("dent", dent_sentence(pressure, limit, race)),) if pressure > limit else ()
 
 

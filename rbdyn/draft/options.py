@@ -64,7 +64,7 @@ def roller_size(text: str) -> tuple[float, float]:
     except ValueError:
         diameter = length = math.nan
     if math.isnan(diameter):
-        raise MethodError('is no diameter x length in mm; write 7x7, or "7 x 7" in quotes')
+        raise MethodError('is not a diameter x length in mm; write 7x7, or "7 x 7" in quotes')
     for what, value, limits in (("diameter", diameter, ROLLER_DIAMETERS), ("length", length, ROLLER_LENGTHS)):
         if fault := _range_fault(value, *limits, "mm"):
             raise MethodError(f"its {what} {fault}")
@@ -84,10 +84,10 @@ def clearance_of(text: str) -> str | float:
     try:
         return plain_number(text, "mm", fault)
     except MethodError as error:
-        if not str(error).startswith("is no number"):
+        if not str(error).startswith("is not a number"):
             raise
         classes = ", ".join(CLEARANCE_CLASSES)
-        raise MethodError(f"is no clearance class; choose one of {classes}, or write millimetres, as 0.02") from None
+        raise MethodError(f"is not a clearance class; choose one of {classes}, or write millimetres, as 0.02") from None
 
 
 def conformity_of(text: str) -> tuple[float, float]:
@@ -115,8 +115,8 @@ def choice(refusal: str, *names: str) -> Callable[[str], str]:
 
 MILLIMETRES, CELSIUS = partial(number, unit="mm"), number(-60.0, 220.0, "C")
 guidance_of = choice("guides no cage", "outer", "inner", "roller")
-cage_material_of = choice("is no material known here", *MATERIALS, POLYAMIDE_NAME)
-supply_of = choice("is no lubrication known here", *SUPPLIES)
+cage_material_of = choice("is not a known material", *MATERIALS, POLYAMIDE_NAME)
+supply_of = choice("is not a known lubrication method", *SUPPLIES)
 
 
 def option(
@@ -258,7 +258,7 @@ class Options:
         if grease and supply != "grease":
             self.fault("--lubrication", f"contradicts the grease of {oil}; leave one out")
         elif supply == "grease" and not grease:
-            self.fault("--lubrication", f'{oil} is no grease; write --oil "grease VG 100" with its base oil')
+            self.fault("--lubrication", f'{oil} is not a grease; write --oil "grease VG 100" with its base oil')
 
     def _check_heat(self) -> None:
         flow, inlet = self["--oil-flow"], self["--oil-inlet"]
@@ -282,7 +282,7 @@ class Options:
         usual = next((name for name, entry in TABLE.items() if key and entry.metadata["key"] == key), "")
         name, sentence = ESTIMATED_KEYS.get(key, (usual, sentence))
         if name == "--clearance" and self[name] is None:
-            return f"{name}: missing; that of the usual class is {sentence.replace('check its unit', 'write it in mm, as 0.01')}"
+            return f"{name}: missing; the usual class: {sentence.replace('check its unit', 'write it in mm, as 0.01')}"
         return fault if self[name] is None else f"{self.words(name)}: {sentence}"
 
 

@@ -77,7 +77,7 @@ def _assumed_temperatures(oil: float | None) -> Values:
 
 def _reason(fit: Interference) -> str:
     if fit == DRIVEN_UP:
-        return "in the clearance, which is that of the bearing driven up"
+        return "in the clearance, which is the clearance after driving up"
     less = f", less {fit.smoothing:.3g} of smoothing" if fit.smoothing else ""
     return f"mean of {fit.low + fit.smoothing:.3g} to {fit.high + fit.smoothing:.3g}{less}; negative is loose"
 
@@ -97,7 +97,7 @@ POLYAMIDE = (
 POLYAMIDE_DENSITY = 1.3e-3
 # Radii of the inner and the outer groove over the ball's diameter, as ISO 281 rates.
 USUAL_GROOVES = (0.52, 0.53)
-BLOCK_BETWEEN = f"{catalogue.WIDEST_BAR:g} roller diameters, for a block from pocket to pocket is no bar; it is stiffer"
+BLOCK_BETWEEN = f"{catalogue.WIDEST_BAR:g} roller diameters; a block from pocket to pocket is stiffer than a bar"
 # Upper end of the documented range of an effective length (unknown_inputs.toml).
 LONGEST_EFFECTIVE = 1.05
 # Of a side ring's width [%]; that of a bearing whose own width is an estimate too.
@@ -306,7 +306,7 @@ def _common(subject: Subject, options: Options, reference: float, capacity: floa
         sizes=sizes,
         boundary=subject.boundary or Boundary(sizes.bore, sizes.outside, sizes.width, "", "", ""),
         own=subject.boundary,
-        reason="a drawing of one's own." if subject.boundary else "catalogues do not list what is inside.",
+        reason="your own drawing." if subject.boundary else "catalogues do not list the internal geometry.",
         oil=oil,
         oil_by="base oil of the grease" if grease else "",
         base_oil=(base or "mineral") if oil.startswith("ISO VG") else None,

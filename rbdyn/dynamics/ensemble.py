@@ -158,7 +158,7 @@ class Pace:
         with self._lock:
             self.turns += turns
             if self.estimate_s is not None:
-                self.estimate_s, self._why = None, f"figures drift, so all runs continue to {length:.4g} shaft turns: "
+                self.estimate_s, self._why = None, f"results drift, so all runs continue to {length:.4g} shaft turns: "
 
     def look(self, run: int, spent_s: float, turns: float) -> None:
         """Look at a run that took so many seconds for so many shaft turns; the estimate is stated once there is a rest worth it."""

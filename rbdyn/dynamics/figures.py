@@ -205,18 +205,18 @@ BEARING = (
     # A slip near zero has no useful relative error; the cage speed shows it.
     Figure(
         "cage_slip",
-        "1 less cage speed over that of rolling without slip",
+        "1 less cage speed over the speed of rolling without slip",
         CAGE_SLIP,
         panel=(1, "slip [%]"),
         worst="farthest from 0",
     ),
     Figure(
         "cage_orbit_radius_share",
-        "root mean square distance of the cage's centre from its mean place over the cage's radial play",
+        "root mean square distance of the cage's centre from its mean place over the cage's radial clearance",
         ORBIT_RADIUS,
         lambda scene: scene.cage_play_m and 1.0 / scene.cage_play_m,
         slow=False,
-        words="radius of the cage's orbit over its radial play",
+        words="radius of the cage's orbit over its radial clearance",
         response=False,
     ),
 )
@@ -349,7 +349,7 @@ CAGE_DAMAGE = (
     # Archard's depth is in proportion to it: of two designs of the same materials the ratio is that of their wear.
     Figure(
         "pocket_sliding_density_W_mm2",
-        "force times sliding speed in a pocket over the area of its track; its ratio to a baseline is that of the depth of wear",
+        "force times sliding speed in a pocket over the area of its track; its ratio to a baseline equals the ratio of the wear depths",
         Statistic(_pocket_track, sliding_over_track),
         lambda scene: (sliding := _pocket_sliding(scene)) and 1e-6 * sliding / _pocket_length(scene),
         kind="damage",
@@ -442,7 +442,7 @@ CAGE_DAMAGE = (
 
 RACE_DAMAGE = (
     *(
-        _sampled(place, f"{race}_{key}", f"{words} of {race} race, 95 % below", unit, True, scale)
+        _sampled(place, f"{race}_{key}", f"{words} of {race} raceway, 95 % below", unit, True, scale)
         for key, words, unit, scale, places in (
             ("power_density_W_mm2", "power density", "W/mm2", 1e-6, (INNER_DENSITIES, OUTER_DENSITIES)),
             ("flash_rise_K", "flash rise", "K", 1.0, (INNER_FLASHES, OUTER_FLASHES)),
@@ -474,25 +474,25 @@ def pocket_impacts(scene: "Scene", runs: Sequence[Replicate]) -> dict[str, list[
 def why_missing(scene: "Scene", key: str) -> str | None:
     """Why a scene has no such figure of damage, stiffness or a start, with the fix; None where it has."""
     if key in START_FIGURES and (scene.thermal is None or scene.thermal.start is None):
-        return "the scene has no [thermal.start]; add that table to its file or choose another figure"
+        return "the scene has no [thermal.start]; add that table to its file or choose another result"
     if key in START_FIGURES and "guide" in key and scene.cage.guidance == "roller":
-        return "no ring guides the cage; choose another figure"
+        return "no ring guides the cage; choose another result"
     figure = next((figure for figure in FIGURES if figure.key == key), None)
     if figure is None:
         return None
     if figure.is_off(scene):
-        return f"the scene leaves it out ({figure.switch} = false); write true or choose another figure"
+        return f"the scene leaves it out ({figure.switch} = false); write true or choose another result"
     if (
         figure.kind == "stiffness"
         and scene.thermal is None
         and scene.operation.largest_load_N == 0.0
         and scene.geometry.clearance >= 0.0
     ):
-        return "the scene has no load and no preload; raise operation.radial_load_N or choose another figure"
+        return "the scene has no load and no preload; raise operation.radial_load_N or choose another result"
     if figure.kind != "damage":
         return None
     if figure.scale_in(scene) is None:
-        return f"the scene leaves out {figure.needs}; state it or choose another figure"
+        return f"the scene leaves out {figure.needs}; state it or choose another result"
     numerics = scene.numerics
     windows = least_windows(numerics.turns, numerics.impact_window_turns, numerics.replicates)
     if figure.statistic is RETURN_FORCE and windows < FEWEST_WINDOWS:
@@ -564,7 +564,7 @@ PARTS = (
     *(
         Figure(
             f"{race}_{key}",
-            f"{quantity(key)[0]} of the {race} race at its largest load",
+            f"{quantity(key)[0]} of the {race} raceway at its largest load",
             kind="contact",
             source=(race, key),
             worst="largest" if "pressure" in key else "least",

@@ -88,7 +88,7 @@ class History(Brief):
         x, y = self.guide_eccentricity
         figures = [
             Figure("largest pocket force", float(np.abs(self.pocket_load).max(initial=0.0)), None, "N"),
-            Figure("largest race load", float(self.inner_load.max(initial=0.0)), None, "N"),
+            Figure("largest raceway load", float(self.inner_load.max(initial=0.0)), None, "N"),
             Figure("largest cage eccentricity", 1e6 * float(np.hypot(x, y).max(initial=0.0)), None, "µm"),
             Figure("mean cage speed", float(self.cage_speed.mean()) * 30.0 / np.pi, None, "rpm"),
         ]
@@ -126,9 +126,9 @@ def history_sheet(rollers: Iterable[str]) -> Sheet[History]:
 
     of_rollers = (
         ("pocket_load", "pocket_{}_N", "force of roller j on its pocket: positive ahead, negative behind"),
-        ("outer_load", "outer_{}_N", "load of roller j on the outer and the inner race"),
+        ("outer_load", "outer_{}_N", "load of roller j on the outer and the inner raceway"),
         ("inner_load", "inner_{}_N", ""),
-        ("outer_slip", "outer_slip_{}_m_s", "surface speed of the race minus that of roller j"),
+        ("outer_slip", "outer_slip_{}_m_s", "surface speed of the raceway minus the surface speed of roller j"),
         ("inner_slip", "inner_slip_{}_m_s", ""),
     )
     numbers = tuple(rollers)

@@ -90,7 +90,7 @@ def overlap(inner: Ring, outer: Ring, interference: float) -> Any:
     """
     if not math.isclose(inner.outer_radius, outer.inner_radius, rel_tol=1e-9):
         raise MethodError(
-            f"radii of {inner.outer_radius:g} and {outer.inner_radius:g} m are not those of one fit; give both "
+            f"radii of {inner.outer_radius:g} and {outer.inner_radius:g} m are not the two radii of one fit; give both "
             "the nominal radius, and the difference as interference"
         )
     radius = outer.inner_radius

@@ -59,7 +59,7 @@ def loads(rows: Mapping[str, Balls], path: Path) -> None:
         azimuth = np.radians(closed(column(balls, "azimuth_deg")))
         for race, colour in (("outer", OUTER), ("inner", INNER)):
             load = closed(column(balls, f"{race}_load_N"))
-            axis.plot(azimuth, load, "o-", color=colour, label=f"{race} race", **LINE)
+            axis.plot(azimuth, load, "o-", color=colour, label=f"{race} raceway", **LINE)
             if race == "inner":
                 axis.fill(azimuth, load, color=colour, alpha=0.12)
         axis.set_rlim(bottom=0.0)
@@ -76,7 +76,7 @@ def angles(rows: Mapping[str, Balls], path: Path) -> None:
     """Contact angles against azimuth; a ball without an inner contact leaves a gap in the inner line."""
     figure, axes = plt.subplots(1, len(rows), figsize=(5.8 * len(rows), 3.8), squeeze=False)
     for axis, (title, balls) in zip(axes[0], rows.items(), strict=True):
-        angles_on(axis, balls, {"inner": INNER, "outer": OUTER}, {"inner": "inner race", "outer": "outer race"})
+        angles_on(axis, balls, {"inner": INNER, "outer": OUTER}, {"inner": "inner raceway", "outer": "outer raceway"})
         axis.set_title(title, fontsize=10)
         axis.legend(frameon=False, fontsize=8)
     save(figure, path)
@@ -168,8 +168,8 @@ MOST_LINES = 5
 STYLES = ("-", "--", ":", "-.", (0, (5, 1, 1, 1, 1, 1)))
 # Column of a map, its label, and whether it spans decades.
 MAPS = (
-    ("inner_pressure_MPa", "peak pressure, inner race [MPa]", False),
-    ("outer_pressure_MPa", "peak pressure, outer race [MPa]", False),
+    ("inner_pressure_MPa", "peak pressure, inner raceway [MPa]", False),
+    ("outer_pressure_MPa", "peak pressure, outer raceway [MPa]", False),
     ("L10_Mrev", "L10 [million turns]", True),
     ("inner_angle_max_deg", "largest inner angle [°]", False),
 )
@@ -216,7 +216,7 @@ def angles_over_key(result: "SweepResult", path: Path) -> None:
                 low, high = (pick(f"{prefix}{race}_angle_{end}_deg") for end in ("min", "max"))
                 axis.fill_between(x, low, high, color=colour, alpha=0.12, linewidth=0.0)
                 axis.plot(x, low, color=colour, linewidth=1.1, linestyle=style)
-                axis.plot(x, high, color=colour, linewidth=1.1, linestyle=style, label=_once(axis, f"{race} race"))
+                axis.plot(x, high, color=colour, linewidth=1.1, linestyle=style, label=_once(axis, f"{race} raceway"))
         _finish(axis, result, "contact angles, least and largest [°]", title)
     save(figure, path)
 
@@ -229,7 +229,7 @@ def pressure_and_life(result: "SweepResult", path: Path) -> None:
         for x, style, _, pick in _lines(result):
             both = [pick(f"{prefix}{race}_pressure_MPa") for race in ("inner", "outer")]
             for race, values, colour in zip(("inner", "outer"), both, (INNER, OUTER), strict=True):
-                pressure.plot(x, values, color=colour, linestyle=style, label=_once(pressure, f"{race} race"))
+                pressure.plot(x, values, color=colour, linestyle=style, label=_once(pressure, f"{race} raceway"))
             _dot(pressure, x, np.maximum(*both), least=True)
             millions = pick(f"{prefix}L10_Mrev")
             life.plot(x, millions, color=GREEN, linestyle=style)

@@ -103,8 +103,8 @@ class Drawing:
         arrows = []
         for line, (role, words, longest, scale) in enumerate(
             (
-                ("outer_force", "outer race", RACE_ARROW, self.race_scale),
-                ("inner_force", "inner race", RACE_ARROW, self.race_scale),
+                ("outer_force", "outer raceway", RACE_ARROW, self.race_scale),
+                ("inner_force", "inner raceway", RACE_ARROW, self.race_scale),
                 ("cage_force", "on the cage", CAGE_ARROW, self.cage_scale),
             )
         ):

@@ -241,8 +241,8 @@ def _around(axis: Axes, history: "History", values: np.ndarray, factor: float, c
 def roller_loads(history: "History", path: Path) -> None:
     """Load of a roller on both races against azimuth: mean, and the band of nine tenths."""
     figure, axis = plt.subplots(figsize=(7.0, 4.2))
-    _around(axis, history, history.outer_load, 1.0, OUTER, "outer race")
-    _around(axis, history, history.inner_load, 1.0, INNER, "inner race")
+    _around(axis, history, history.outer_load, 1.0, OUTER, "outer raceway")
+    _around(axis, history, history.inner_load, 1.0, INNER, "inner raceway")
     axis.set_ylim(bottom=0.0)
     axis.set(xlabel="azimuth of the roller from the load [°]", ylabel="roller load [N]\nmean, and 5 % to 95 %")
     axis.legend(fontsize=9)
@@ -259,8 +259,8 @@ def sliding(history: "History", path: Path) -> None:
         ("heat of a contact [W]", 1.0, history.outer_heat, history.inner_heat),
     )
     for axis, (words, factor, outer, inner) in zip(axes, panels, strict=True):
-        _around(axis, history, outer, factor, OUTER, "outer race")
-        _around(axis, history, inner, factor, INNER, "inner race")
+        _around(axis, history, outer, factor, OUTER, "outer raceway")
+        _around(axis, history, inner, factor, INNER, "inner raceway")
         axis.set_ylabel(words)
     axes[0].legend(fontsize=9)
     axes[0].set_title("mean, and 5 % to 95 % of the samples", fontsize=10)

@@ -125,7 +125,7 @@ def clearances(scene: "Scene") -> Sketch:
         sizes_in_words.append(
             f"3: guide clearance, {scene.cage.guide_clearance_mm:g} mm on the diameter, half of it all around; drawn {factors['guide']:g} times as wide."
         )
-    caption = f"{_name(scene)}, section through one roller, each part in the middle of its play. {' '.join(sizes_in_words)} Rollers and cage are drawn smaller."
+    caption = f"{_name(scene)}, section through one roller, each part in the middle of its clearance. {' '.join(sizes_in_words)} Rollers and cage are drawn smaller."
     return Sketch(canvas.svg(), caption)
 
 
@@ -161,7 +161,7 @@ def roller_axes(scene: "Scene") -> Sketch:
         canvas.words((u, v + 4.5), str(roller), "small")
     caption = (
         f"{_name(scene)}, seen as drawings and films show it. x points along the load on the inner ring, y is 90 degrees "
-        "ahead of it. Angles such as ψ, here that of roller 2, count from x towards y, the sense of positive speeds. "
+        "ahead of it. Angles such as ψ, here at roller 2, count from x towards y, the sense of positive speeds. "
         "Clearances are widened and rollers drawn smaller."
     )
     return Sketch(canvas.svg(), caption)

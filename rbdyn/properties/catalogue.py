@@ -189,7 +189,7 @@ def read_designation(text: str) -> Designation:
             words = tuple(part for parts, _ in read for part in parts)
             return Designation(kind, letters, series, code, words, suffixes, prefix)
     raise MethodError(
-        "is no designation known here; write NU, NJ, NUP, N or NF with series 10, 2, 22, 3 or 23 (NU210), a deep "
+        "is not a known designation; write NU, NJ, NUP, N or NF with series 10, 2, 22, 3 or 23 (NU210), a deep "
         "groove ball bearing of series 60, 62, 63, 618, 619 (6208) or an angular contact one of 70, 72, 73, 718, "
         "719 (7208B)"
     )
@@ -274,7 +274,7 @@ class RollerInterior(NamedTuple):
     effective_length_by: str
     rollers_by: str = "estimated: 1.22 roller diameters apart, +-1"
     roller_length_by: str = "estimated: 0.1 diameters longer, +-5 %"
-    bar_width_by: str = "what the pockets leave at the pitch circle; rollers +-1 make it +-40 %"
+    bar_width_by: str = "width between the pockets at the pitch circle; rollers +-1 make it +-40 %"
 
 
 class BallInterior(NamedTuple):
@@ -330,7 +330,7 @@ def diameter_series(bore: float, outside: float) -> str:
 def radial_clearance(bore: float, name: str, kind: str) -> tuple[float, float]:
     """Limits of a class of ISO 5753-1 [um] of a cylindrical roller or a deep groove ball bearing. Raises MethodError."""
     if name not in CLEARANCE_CLASSES:
-        raise MethodError(f"{name} is no clearance class here; choose one of {', '.join(CLEARANCE_CLASSES)}")
+        raise MethodError(f"{name} is not a clearance class; choose one of {', '.join(CLEARANCE_CLASSES)}")
     listed = [row for row in table("clearance_classes") if row["kind"] == kind and row[f"{name}_min"]]
     for row in listed:
         if bore <= float(row["bore"]):

@@ -125,7 +125,7 @@ def _bore(drawing: RollerDrawing | BallDrawing, size: float | None, estimates: l
         return Estimate(size, STATED)
     raceway = drawing.pitch_diameter - drawing.diameter
     least, most = THICK_RING_BORE * raceway, raceway - 2.0 * THINNEST_RING * drawing.diameter
-    thick = Estimate(least, f"estimated: {THICK_RING_BORE:g} of the inner raceway, for no usual ring fits")
+    thick = Estimate(least, f"estimated: {THICK_RING_BORE:g} of the inner raceway, because no usual ring fits")
     return next((estimate for estimate in estimates if least < estimate.size < most), thick).rounded
 
 
@@ -134,7 +134,7 @@ def _outside(drawing: RollerDrawing | BallDrawing, size: float | None, estimates
     if size is not None:
         return Estimate(size, STATED)
     raceway = drawing.pitch_diameter + drawing.diameter
-    thin = f"estimated: a ring of {THIN_RING:g} rolling element diameters, for no usual ring fits"
+    thin = f"estimated: a ring of {THIN_RING:g} rolling element diameters, because no usual ring fits"
     fitting = (estimate for estimate in estimates if estimate.size > raceway + 2.0 * THINNEST_RING * drawing.diameter)
     return next(fitting, Estimate(raceway + 2.0 * THIN_RING * drawing.diameter, thin)).rounded
 
@@ -158,7 +158,7 @@ def drawing_roller_interior(drawing: RollerDrawing) -> RollerInterior:
         effective_length_by=f"estimated: chamfers of {0.5 * ends:.3g} mm, {rule}, take both ends; +-5 %",
         rollers_by=STATED,
         roller_length_by=STATED,
-        bar_width_by="what the pockets leave at the pitch circle, as exact as their clearance",
+        bar_width_by="width between the pockets at the pitch circle, as exact as their clearance",
     )
 
 

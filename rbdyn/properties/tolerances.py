@@ -52,7 +52,7 @@ def fit_limits(nominal_mm: float, code: str) -> tuple[float, float]:
     match = CODE.fullmatch(code)
     if match is None or f"IT{match[2]}" not in STANDARD_TOLERANCES:
         raise MethodError(
-            'is no tolerance class such as "h6", "k5" or "H7"; letters known: d to h, j, js, k, m, n, p, r, s'
+            'is not a tolerance class such as "h6", "k5" or "H7"; letters known: d to h, j, js, k, m, n, p, r, s'
         )
     letter, width = match[1], grade_tolerances(nominal_mm)[f"IT{match[2]}"]
     if letter in ("js", "JS"):
@@ -145,7 +145,7 @@ def ring_limits(nominal_mm: float, code: str) -> tuple[float, float]:
     name, _, surface = code.partition(" ")
     if surface not in SURFACES or name not in CLASSES:
         raise MethodError(
-            f'is no ring class such as "P5 bore" or "Normal outside"; classes known: {", ".join(CLASSES)}'
+            f'is not a ring class such as "P5 bore" or "Normal outside"; classes known: {", ".join(CLASSES)}'
         )
     ranges, lower = SURFACES[surface]["sizes_mm"], SURFACES[surface][name]
     column = bisect_left(ranges, nominal_mm)
@@ -182,7 +182,7 @@ def shaft_interference(bore_mm: float, zone: str, ring_class: str = "Normal") ->
     """
     if not SHAFT.fullmatch(zone):
         raise MethodError(
-            'is no tolerance class of a shaft such as "k5"; take g, h, j, js, k, m, n, p or r, grade 4 to 7'
+            'is not a tolerance class of a shaft such as "k5"; take g, h, j, js, k, m, n, p or r, grade 4 to 7'
         )
     return _interference(fit_limits(bore_mm, zone), _bought_limits(bore_mm, ring_class, "bore"), SHAFT_SMOOTHING)
 
@@ -191,7 +191,7 @@ def housing_interference(outside_mm: float, zone: str, ring_class: str = "Normal
     """Interference of an outer ring in a housing of a class such as "H7". Raises MethodError as ``shaft_interference``."""
     if not HOUSING.fullmatch(zone):
         raise MethodError(
-            'is no tolerance class of a housing such as "H7"; take G, H, J, JS, K, M, N or P, grade 5 to 8'
+            'is not a tolerance class of a housing such as "H7"; take G, H, J, JS, K, M, N or P, grade 5 to 8'
         )
     return _interference(
         _bought_limits(outside_mm, ring_class, "outside"), fit_limits(outside_mm, zone), HOUSING_SMOOTHING

@@ -113,11 +113,11 @@ def overload(solution: Solution, rating: Rating) -> str:
         if half > groove:
             azimuth = 360.0 * loads.argmax() / len(loads)
             return (
-                f"overloaded: the ball at {azimuth:.0f} deg would carry {loads.max():.4g} N on the {race} race over "
+                f"overloaded: the ball at {azimuth:.0f} deg would carry {loads.max():.4g} N on the {race} raceway over "
                 f"{2e3 * half:.3g} mm in a groove of {1e3 * groove:.3g} mm radius; reduce the load"
             )
     over = (item for item in pressures(solution, rating).items() if item[1] > SHAKEDOWN[BALLS])
-    return next((f"overloaded: {race} race by {overload_sentence(peak, BALLS)}" for race, peak in over), "")
+    return next((f"overloaded: {race} raceway by {overload_sentence(peak, BALLS)}" for race, peak in over), "")
 
 
 def edge_angles(solution: Solution, rating: Rating, race: Race) -> Array:
@@ -176,8 +176,8 @@ def remarks(solution: Solution, rating: Rating, name: str = "") -> list[Remark]:
     # fmt: off
     listed = [
         ("loose-ring", "unloaded", clear == size,
-            "no ball touches the inner race, so the position of the ring is undetermined; load the ring or reduce the clearance"),
-        ("clear-balls", "clear balls", 0 < clear < size, f"{clear} of {size} balls are clear of the inner race"),
+            "no ball touches the inner raceway, so the position of the ring is undetermined; load the ring or reduce the clearance"),
+        ("clear-balls", "clear balls", 0 < clear < size, f"{clear} of {size} balls are clear of the inner raceway"),
         ("dent", "inner dent", inner > BALLS, dent_sentence(inner, BALLS, "inner")),
         ("dent", "outer dent", outer > BALLS, dent_sentence(outer, BALLS, "outer")),
         ("no-shoulder", "steep angle", steep,
@@ -296,7 +296,7 @@ class BallResult(Brief, SavedRecord, kw_only=True):
         """Inverse of ``as_dict``. Raises KeyError or TypeError for anything else."""
         result = super().from_dict(data)
         if result.is_equilibrium and result.report is None:
-            raise KeyError("an equilibrium without its figures")
+            raise KeyError("an equilibrium without its results")
         return result
 
     def __getattr__(self, name: str) -> Any:
@@ -364,7 +364,7 @@ class BallResult(Brief, SavedRecord, kw_only=True):
         for name, row in self.row_reports.items() if self.report else ():
             of_row = f"{name} row " if name else ""
             stress = row.max_stress_MPa.items()
-            figures += [Figure(f"{of_row}pressure, {race} race", p, None, "MPa") for race, p in stress]
+            figures += [Figure(f"{of_row}pressure, {race} raceway", p, None, "MPa") for race, p in stress]
             figures.append(Figure(f"{of_row}life L10", row.life["L10_Mrev"], None, "million turns"))
         for axis in "xyz" if self.report else "":
             figures.append(Figure(f"displacement {axis}", 1e3 * self.reached.displacement_mm[axis], None, "µm"))

@@ -59,7 +59,7 @@ MEANINGS = {
     "stiffness_tilt_x_Nm_per_mrad stiffness_tilt_y_Nm_per_mrad": "the same of tilts",
     "inner_angle_min_deg inner_angle_max_deg outer_angle_min_deg outer_angle_max_deg": "extremes of the contact angles",
     "inner_angle_ball_1_deg outer_angle_ball_1_deg": "contact angles of the first ball",
-    "loaded_balls": "balls that touch the inner race",
+    "loaded_balls": "balls that touch the inner raceway",
     "inner_load_max_N outer_load_max_N": "largest contact loads",
     "inner_pressure_MPa outer_pressure_MPa": "largest Hertz pressures",
     "L10_Mrev L10_h": "life",

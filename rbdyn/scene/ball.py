@@ -307,8 +307,7 @@ class FormErrors(Consistent):
     steps: Annotated[int, Field(ge=8, le=100_000)] = 360
     """Steps in a turn of the inner ring against the outer ring."""
     turns: Annotated[int, Field(ge=1, le=10_000)] = 8
-    """Turns of the inner ring over which runout is computed. More than one is needed, because the cage does not return to its
-    place after one turn."""
+    """Turns of the inner ring over which runout is computed; the cage does not return to its place after one."""
 
     def faults(self) -> Iterator[str]:
         for key in GROOVES:

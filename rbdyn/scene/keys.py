@@ -312,7 +312,7 @@ def _fault(key: str, text: str) -> str:
         return "is empty; fill it in or remove the row"
     if len(text) > LONGEST_NUMBER:
         return f"is longer than {LONGEST_NUMBER} characters; write a shorter value"
-    return f"is no value of that key; rbdyn keys {key} lists which are"
+    return f"is not a value of that key; rbdyn keys {key} lists which are"
 
 
 def _adapter(key: str) -> TypeAdapter[Any]:

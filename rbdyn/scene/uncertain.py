@@ -107,7 +107,7 @@ class Law(Strict):
         if any(value in values[:place] for place, value in enumerate(values)):
             yield f"values = {values}: name each value once; weights give its probability"
         if self.times is not None:
-            yield f"times = '{self.times}': choices are no numbers to multiply; leave it out"
+            yield f"times = '{self.times}': choices are not numbers and cannot be multiplied; leave it out"
 
     def _range_faults(self) -> Iterator[str]:
         low, high = self.low, self.high

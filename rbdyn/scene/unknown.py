@@ -190,7 +190,7 @@ def _times_faults(scene: Scene, inputs: Iterable[Input]) -> Iterator[str]:
         elif base == 0.0:
             yield f"{where}: the scene has 0 there, so all multiples are 0; give a law without times"
         elif other is not None and not all(map(is_number, getattr(other, "values", None) or ())):
-            yield f"{where}: the values of that key are no numbers; name another key"
+            yield f"{where}: the values of that key are not numbers; name another key"
         path, step = set[str](), key
         while step in laws and step not in visited and (base_key := laws[step].times) not in (None, step):
             path.add(step)

@@ -62,7 +62,7 @@ def orbit_measures(orbit: Complex, play: float, samples_per_turn: float = SAMPLE
     Raises ValueError where the play is not positive or the orbit has less than one cage turn.
     """
     if not play > 0:
-        raise ValueError(f"The radial play of the cage is {play} m; the verdict needs a play above 0.")
+        raise ValueError(f"The radial clearance of the cage is {play} m; the verdict needs a clearance above 0.")
     if len(orbit) < samples_per_turn:
         raise ValueError(
             f"The orbit has {len(orbit)} samples; the verdict needs at least a cage turn of {samples_per_turn:g}."

@@ -94,7 +94,7 @@ def test_an_empty_expression_is_the_fault_of_its_own_link():
     with pytest.raises(InputError) as refused:
         chain_from(data, "c.toml")
     assert refused.value.faults == [
-        'c.toml: link "f": expression = "": is no arithmetic expression; write it like 0.5*(bore - shaft)'
+        'c.toml: link "f": expression = "": is not an arithmetic expression; write it like 0.5*(bore - shaft)'
     ]
 
 

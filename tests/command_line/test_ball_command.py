@@ -44,7 +44,7 @@ def test_unit_runout_of_a_scene_follows_its_errors():
 @pytest.mark.parametrize(
     ("study", "assignments", "words"),
     [
-        (lambda scene: race_limits(scene, "P3", 0.95), [], "--race-limits P3: is no tolerance class; choose one of P2"),
+        (lambda scene: race_limits(scene, "P3", 0.95), [], "--race-limits P3: is not a tolerance class; choose one of P2"),
         (lambda scene: race_limits(scene, "P2", 0.95), [], "bearing.bore_mm: missing"),
         (lambda scene: race_limits(scene, "P6", 0.95), ["bearing.bore_mm=35.0"], "sets no limit on axial runout"),
         (lambda scene: runout_record(scene), [], "errors: missing"),
@@ -206,8 +206,8 @@ def test_command_line_prints_notes_of_points_unless_quiet():
     """Command line: each note stands once, with how many points it is about and where the first is; dangers alone with --quiet."""
     arguments = ["ball", str(SINGLE), "--sweep", "operation.axial_load_N=100,20000,40000"]
     loud, quiet = (CliRunner().invoke(app, [*arguments, *more]).stdout for more in ((), ("--quiet",)))
-    assert loud.startswith("Danger: outer race: dented by 4370 MPa") and quiet.startswith(
-        "Danger: outer race: dented by"
+    assert loud.startswith("Danger: outer raceway: dented by 4370 MPa") and quiet.startswith(
+        "Danger: outer raceway: dented by"
     )
     assert " (2 points, the first at operation.axial_load_N = 20000)" in loud
     assert "warning: " in loud and "warning: " not in quiet and "note" not in quiet

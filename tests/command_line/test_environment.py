@@ -119,7 +119,7 @@ def test_save_names_what_no_file_can_be(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     answer = doe.chain(EXAMPLES / "pocket_chain.toml")
     for path, words in ((".", "is a folder; name a file in it"), (tmp_path, "is a folder"), (3, "must be the path of a file"),
-                        ("none/a.json", "there is no folder none; make it first"), ("", "is a folder")):  # fmt: skip
+                        ("none/a.json", "missing folder none; make it first"), ("", "is a folder")):  # fmt: skip
         with pytest.raises(InputError, match=words):
             answer.save(path)
         with pytest.raises(InputError, match=words):

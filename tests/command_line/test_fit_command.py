@@ -350,7 +350,7 @@ def test_unit_runs_as_large_as_a_table_may_have_are_fitted_without_a_warning(tmp
     ("options", "words"),
     [
         ((), "name its factors by --factor NAME and its responses by --response NAME; it has run, radial_clearance_mm"),
-        (("--factor", "radial"), "--factor radial: is no column of"),
+        (("--factor", "radial"), "--factor radial: is not a column of"),
         (("--response", "powr"), "; it has run, radial_clearance_mm, guide_clearance_mm, pocket_clearance_mm, impact"),
         (("--response", "power_loss_W", "--model", "cubic"), "model = 'cubic': choose one of 'linear', 'interaction'"),
         (("--factor", "power_loss_W", "--response", "impact_force_N"), "--factor power_loss_W: is 9 in every row of"),

@@ -45,7 +45,9 @@ def test_every_key_says_what_it_means(model):
     for name, text in descriptions(model).items():
         assert text.endswith((".", ".)")) and len(text.split()) > 1 and text.rstrip(".") != name, name
         first = re.split(r"(?<=[.?])\s", text)[0]
-        assert len(re.findall(r"\S*[A-Za-z]\S*", first)) <= 20 and not first.startswith(("The ", "Its ", "Makes ")), f"{name}: {first}"
+        assert len(re.findall(r"\S*[A-Za-z]\S*", first)) <= 20 and not first.startswith(("The ", "Its ", "Makes ")), (
+            f"{name}: {first}"
+        )
         stated = re.findall(r"\b(Default|Effect)\b[^:.]*:", text)
         assert stated in ([], ["Default"], ["Effect"], ["Default", "Effect"]), f"{name}: {text}"
 

@@ -106,7 +106,7 @@ def test_unit_names_survive_the_template(scene, tmp_path):
         (TABLE.replace("0.75", "75"), ["share in row 2 = 75: is beyond 1; check the unit"]),
         (TABLE.replace("20000", "fast"), ["operation.inner_speed_rpm in row 2 = 'fast'"]),
         (TABLE.replace("idle", ""), ["row 1: name = ''"]),
-        (TABLE.replace("20000", "2e9"), ["operation.inner_speed_rpm in row 2 = 2e9: is no value of that key"]),
+        (TABLE.replace("20000", "2e9"), ["operation.inner_speed_rpm in row 2 = 2e9: is not a value of that key"]),
         (TABLE.replace("800", "9e6"), ["duty 'cruise': operation.radial_load_N = 9e+06: a roller of 9 mm would have"]),
         ("name,share\n", ["has a header and no rows"]),
     ],

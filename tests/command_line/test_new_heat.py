@@ -95,7 +95,7 @@ def test_command_line_a_new_file(command, tmp_path):
     """Command line: --out writes what is printed otherwise, over nothing without --force; a study finds its scene."""
     path, study = tmp_path / "scenes" / "my.toml", tmp_path / "my study.toml"
     missing = command("new", "NU210", "--out", path)
-    assert missing.returncode == 2 and "there is no folder" in missing.stderr
+    assert missing.returncode == 2 and "missing folder" in missing.stderr
     path.parent.mkdir()
     written = command("new", "NU210", "--out", path)
     assert written.stdout == f"written to {path}; next: rbdyn simulate {path}\n"

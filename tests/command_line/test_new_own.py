@@ -40,15 +40,15 @@ def test_unit_roller_sizes(text):
     ("reader", "text", "sentence"),
     [
         (roller_size, "7,5x8", "has a decimal comma; write 7.5x8"),
-        (roller_size, "7", 'is no diameter x length in mm; write 7x7, or "7 x 7" in quotes'),
-        (roller_size, "7x7x7", 'is no diameter x length in mm; write 7x7, or "7 x 7" in quotes'),
-        (roller_size, "7.5.1x7", 'is no diameter x length in mm; write 7x7, or "7 x 7" in quotes'),
+        (roller_size, "7", 'is not a diameter x length in mm; write 7x7, or "7 x 7" in quotes'),
+        (roller_size, "7x7x7", 'is not a diameter x length in mm; write 7x7, or "7 x 7" in quotes'),
+        (roller_size, "7.5.1x7", 'is not a diameter x length in mm; write 7x7, or "7 x 7" in quotes'),
         (roller_size, "0.2x7", "its diameter must be from 1 to 150 mm; fix it"),
         (roller_size, "7x700", "its length must be from 0.5 to 400 mm; fix it"),
         (clearance_of, "0,02", "has a decimal comma; write 0.02"),
         (clearance_of, "20", "must be from -0.2 to 2 mm; if 20 um are meant, write 0.02"),
         (clearance_of, "nan", "is not a finite number; write a plain number"),
-        (clearance_of, "C9", "is no clearance class; choose one of C2, CN, C3, C4, C5, or write millimetres, as 0.02"),
+        (clearance_of, "C9", "is not a clearance class; choose one of C2, CN, C3, C4, C5, or write millimetres, as 0.02"),
         (conformity_of, "0.5", "must be groove radius over ball diameter, from 0.501 to 0.7; write 0.52, or 0.515/0.525 for inner and outer"),
         (conformity_of, "0,52", "has a decimal comma; write 0.52"),
     ],
@@ -89,7 +89,7 @@ def test_unit_clearances_and_conformities():
         ((*ROLLERS, "--width", "140"), ["--width 140: leaves side rings of a cage out of proportion to such rollers; narrow it"]),
         (("own", "--rollers", "44", "--roller", "3x19", "--pitch", "47.4", "--cage-material", "polyamide"), ["--rollers 44: leaves bars of a cage that are too slender for such rollers; take fewer or shorter ones"]),
         (("own", "--rollers", "30", "--roller", "30x30", "--pitch", "600"), ["--clearance CN: CN is listed to a bore of 400 mm, not of 539.2 mm; take a smaller bearing, another class, or give the clearance in mm"]),
-        ((*BALLS, "--oil", "castor", "--pitch", "x"), ["--pitch x: is no number; write a plain number in mm", OIL]),
+        ((*BALLS, "--oil", "castor", "--pitch", "x"), ["--pitch x: is not a number; write a plain number in mm", OIL]),
         ((*BALLS, "--balls", "30"), ["--balls 30: balls of 9.525 mm overlap on --pitch 65, where each has 6.794 mm; take at most 21"]),
         ((*BALLS, "--ball", "70"), ["--pitch 65: leaves no inner raceway under balls of 70 mm; enlarge it"]),
         ((*BALLS, "--clearance", "0.02"), ["--clearance 0.02: contradicts --contact-angle 25, which gives it; leave one out"]),
@@ -212,7 +212,7 @@ def test_command_line_comments_state_sources(command):
     assert "# Bore 46 mm, stated." in text and "# Width 10.8 mm, estimated: roller + 0.54 roller diameters" in text
     assert "designation" not in tomllib.loads(text)["bearing"]
     few = command("new", "own", "--rollers", "5", "--roller", "7x7", "--pitch", "90").stdout
-    assert re.search(r"bar_width_mm = 14\.0 +# estimated: 2 roller diameters, for a block", few)
+    assert re.search(r"bar_width_mm = 14\.0 +# estimated: 2 roller diameters; a block", few)
     mixed = command("new", *ROLLERS, "--cage-material", "PEEK").stdout
     assert "# stated: peek; assumed: guided by the outer ring" in mixed
     balls = command("new", *BALLS, "--conformity", "0.515/0.525").stdout

@@ -63,11 +63,11 @@ def test_command_line_limits_that_are_refused(scene):
     """Command line: a name, a number, a sign or a pair that cannot be is one sentence each, all at once; exit 2."""
     limits = {
         "loss<=3": f"no response has that name; choose one of {listed(responses_of(heats=True))}",
-        "impact_force_N<=abc": "abc is no number; write a plain number in N",
+        "impact_force_N<=abc": "abc is not a number; write a plain number in N",
         "impact_force_N<=0,5": "0,5 has a decimal comma; write 0.5",
         "impact_force_N<=inf": "inf is not a finite number; write a plain number",
-        "impact_force_N": 'is no limit; write "NAME<=VALUE" or "NAME>=VALUE" in quotes',
-        "impact_force_N<3": 'is no limit; write "NAME<=VALUE" or "NAME>=VALUE" in quotes',
+        "impact_force_N": 'is not a limit; write "NAME<=VALUE" or "NAME>=VALUE" in quotes',
+        "impact_force_N<3": 'is not a limit; write "NAME<=VALUE" or "NAME>=VALUE" in quotes',
     }
     typed = [*limits, "cage_slip>=0.1", "cage_slip<=0.05", "power_loss_W<=3", "power_loss_W=2"]
     refused = doe("new", scene, *(word for limit in typed for word in ("--limit", limit)))
@@ -85,7 +85,7 @@ def test_command_line_places_without_a_file_are_refused_first(scene, tmp_path):
     gone, there = tmp_path / "gone" / "x.toml", tmp_path / "there.toml"
     there.write_text("kept", encoding="utf-8")
     for place, words in {
-        gone: f"{gone}: there is no folder {gone.parent}; make it first",
+        gone: f"{gone}: missing folder {gone.parent}; make it first",
         tmp_path: f"{tmp_path}: is a folder; name a file in it",
         there: f"--out {there}: exists; add --force to write over it, or name another file",
     }.items():

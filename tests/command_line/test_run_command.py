@@ -93,7 +93,7 @@ def test_a_part_of_another_table_is_refused(folder, monkeypatch):
     assert refused.stderr == "--out out: part-1-of-2 is a part of another input; remove it or name another folder\n"
     for part, words in {"5/4": "a part from 1 to 4", "0/4": "a part from 1 to 4", "x": "K/N"}.items():
         refused = doe("run", rows, "--scene", "base.toml", "--out", "out", "--part", part)
-        assert refused.returncode == 2 and f"--part {part}: there is no such part; write {words}" in refused.stderr
+        assert refused.returncode == 2 and f"--part {part}: this part does not exist; write {words}" in refused.stderr
     few = doe("run", rows, "--scene", "base.toml", "--out", "few", "--part", "3/4")
     assert few.returncode == 2 and "--part 3/4: has no row" in few.stderr and not Path("few").exists()
 

@@ -162,7 +162,7 @@ def test_literature_clearance_classes():
     assert radial_clearance(40.0, "C5", "deep_groove_ball") == (40.0, 64.0)
     with pytest.raises(ValueError, match="C5 is listed to a bore of 100 mm, not of 120 mm"):
         radial_clearance(120.0, "C5", "deep_groove_ball")
-    with pytest.raises(ValueError, match="C1 is no clearance class here; choose one of C2, CN, C3, C4, C5"):
+    with pytest.raises(ValueError, match="C1 is not a clearance class; choose one of C2, CN, C3, C4, C5"):
         radial_clearance(50.0, "C1", "cylindrical_roller")
     with pytest.raises(ValueError, match="take a smaller bearing"):
         radial_clearance(500.0, "CN", "cylindrical_roller")
@@ -184,7 +184,7 @@ def test_unit_designations(text, name):
 @pytest.mark.parametrize("text", ["", "NU", "NU2", "210", "608", "22210", "NA4905", "NU999", "NU" * 5000, "一二三"])
 def test_unit_unknown_designations(text):
     """Unit: what is no designation of these kinds is refused with what may be written."""
-    with pytest.raises(ValueError, match="is no designation known here; write NU"):
+    with pytest.raises(ValueError, match="is not a known designation; write NU"):
         read_designation(text)
 
 

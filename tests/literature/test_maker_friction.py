@@ -119,7 +119,7 @@ def test_unit_no_check_without_a_model(make_scene):
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("XY99", "bearing.designation = 'XY99': is no designation known here"),
+        ("XY99", "bearing.designation = 'XY99': is not a known designation"),
         ("NU 299", "bearing.designation = 'NU 299': is not in the tables here; correct it or leave it out"),
         ("6208 C3", "bearing.designation = '6208 C3': is a ball bearing; name the cylindrical roller bearing"),
         ("NU 210 V", "bearing.designation = 'NU 210 V': suffix V is a bearing without a cage"),

@@ -214,7 +214,7 @@ def test_a_better_point_that_speaks_for_itself_is_recommended(predicted):
     assert sentence.endswith("nothing that the study knows speaks against it: consider it.")
     forecast.at, forecast.searched = (lambda point: None), SimpleNamespace(name="adaptive")
     (sentence,) = rivals_sentences(forecast, simulated(study, surfaces, swapped, {name: 0.1}))
-    assert "no point of the adaptive front, from which the pick is chosen" in sentence
+    assert "not a point of the adaptive front, from which the pick is chosen" in sentence
 
 
 def test_a_simulation_begins_with_bearing_point_and_date(monkeypatch):
@@ -232,7 +232,7 @@ def test_a_simulation_begins_with_bearing_point_and_date(monkeypatch):
         and bearing == "cylindrical roller bearing, 10 rollers 9 x 5 mm, pitch diameter 43.5 mm"
     )
     assert point == "24000 rpm, 1300 N radial, MIL-L-7808 at 100 °C" and date.fromisoformat(day)
-    assert shown.index("power loss [W]") < shown.index("race loads")
+    assert shown.index("power loss [W]") < shown.index("raceway loads")
 
 
 def test_balls_have_their_figures_before_the_table_of_all_balls():
@@ -255,7 +255,7 @@ def test_notes_of_runs_stand_in_the_order_of_their_mean_place():
     assert notes == [
         "too hot",
         "drifted",
-        "whirl: 0.8 um (in 3 of 3 runs; figures of the first)",
+        "whirl: 0.8 um (in 3 of 3 runs; values of the first)",
         "dented by 5 MPa (in 1 of 3 runs)",
-        "left out: 13 W (in 3 of 3 runs; figures of the first)",
+        "left out: 13 W (in 3 of 3 runs; values of the first)",
     ]

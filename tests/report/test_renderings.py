@@ -147,15 +147,15 @@ def test_a_screen_has_five_notes_and_says_where_the_others_are():
 def test_dangers_come_first_even_quietly_and_take_the_place_of_notes():
     """Unit: every danger before anything else in all renderings; of six notes five are shown, the dangers among them."""
     notes = (
-        Note("dent", "inner race: dented by 5 MPa"),
-        Note("dent", "outer race: dented by 4 MPa"),
+        Note("dent", "inner raceway: dented by 5 MPa"),
+        Note("dent", "outer raceway: dented by 4 MPa"),
         Note("heat", "hot"),
     )
     notes = (*long_notes(5), *notes)
     tree = with_notes([*plain(notes[:3]), *notes[3:]], [Heading("answer")])
     quiet = terminal.text([Paragraph("bearing"), *tree], Detail.LEAST).splitlines()
     assert (
-        quiet[:2] == ["Danger: hot", "Danger: inner race: dented by 5 MPa; likewise outer race"]
+        quiet[:2] == ["Danger: hot", "Danger: inner raceway: dented by 5 MPa; likewise outer raceway"]
         and "warning" not in quiet[-1]
     )
     assert terminal.text(tree).count("warning:") == 3 and "2 more notes" in terminal.text(tree)

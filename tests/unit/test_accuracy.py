@@ -143,7 +143,7 @@ def test_command_accuracy(command, tmp_path, monkeypatch):
     [
         (
             ("slices",),
-            "slices: is no study of a bearing of kind 'cylindrical_roller'; choose tolerances or methods or ",
+            "slices: is not a study of a bearing of kind 'cylindrical_roller'; choose tolerances or methods or ",
         ),
         (("tolerances", "--set", "numerics.replicates=1"), "numerics.replicates = 1"),
     ],

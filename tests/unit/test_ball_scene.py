@@ -314,4 +314,4 @@ UNLOADED = ("operation.radial_load_N=0.0", "operation.axial_load_N=0.0")
 def test_unit_balls_without_a_load_touch_nothing():
     """Unit: loads left over from rounding are no contact; the result says that nothing tells where the ring is."""
     idle = BallScene.load(EXAMPLES / "angular_contact_ball.toml", UNLOADED)
-    assert any("no ball touches the inner race" in note for note in equilibrium(idle).notes)
+    assert any("no ball touches the inner raceway" in note for note in equilibrium(idle).notes)

@@ -248,7 +248,9 @@ def test_command_line_has_the_studies_of_the_kind_of_bearing(command):
     assert accuracy.study_name(None, scene) == accuracy.study_name("methods", scene) == "methods"
     ended = command("accuracy", BALLS, "coverage")
     assert ended.returncode == 2
-    assert ended.stderr.startswith("coverage: is no study of a bearing of kind 'angular_contact_ball'; choose methods")
+    assert ended.stderr.startswith(
+        "coverage: is not a study of a bearing of kind 'angular_contact_ball'; choose methods"
+    )
 
 
 def test_unit_two_rows_are_refused():

@@ -172,10 +172,10 @@ def test_threads_change_no_bit_of_a_bent_chain():
 @pytest.mark.parametrize(
     ("function", "words"),
     [
-        ({"press_fit": {"shaft": "c", "bore": "x", "raceway_mm": 30.0}}, 'uses "x", which is no link before it'),
+        ({"press_fit": {"shaft": "c", "bore": "x", "raceway_mm": 30.0}}, 'uses "x", which is not an earlier link'),
         ({"press_fit": {"shaft": "c", "bore": "d", "raceway_mm": 25.0}}, "outside_mm is missing"),
         ({"press_fit": {"shaft": "c", "bore": "d", "raceway_mm": 27.0, "outside_mm": 30.0}}, "is on neither part"),
-        ({"expression": "a +"}, 'expression = "a +": is no arithmetic expression'),
+        ({"expression": "a +"}, 'expression = "a +": is not an arithmetic expression'),
         ({"expression": "open(a)"}, "only + - * / **"),
         (
             {"thermal_growth": {"of": "a", "expansion_per_K": 1e-5, "temperature_rise_K": 9.0, "lower_K": 5.0}},
@@ -211,7 +211,7 @@ def test_wrong_functions_are_refused_with_key_value_and_mend(function, words):
         ("+".join(["b"] * 5000), "has 9999 characters, more than 1000"),
         ("-" * 5000 + "b", "has 5001 characters, more than 1000"),
         ("-" * 101 + "b", "nests deeper than 100 operations"),
-        ("(" * 300 + "b" + ")" * 300, "is no arithmetic expression"),
+        ("(" * 300 + "b" + ")" * 300, "is not an arithmetic expression"),
     ],
 )
 def test_an_expression_without_a_value_is_told_by_its_own_link(expression, words):

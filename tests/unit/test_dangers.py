@@ -69,17 +69,17 @@ def test_notes_alike_are_one_and_the_worst_come_first():
         Note("numerical-error", "power loss: may be off by 3 %; tighten rtol"),
         Note("numerical-error", "cage speed: may be off by 1.5e-3 %; tighten rtol"),
         Note("numerical-error", "whirl: may be off by 3 %, mostly scatter"),
-        Note("dent", "inner race: dented by 4100 MPa"),
-        Note("dent", "inner race: dented by 4200 MPa").about("at climb"),
+        Note("dent", "inner raceway: dented by 4100 MPa"),
+        Note("dent", "inner raceway: dented by 4200 MPa").about("at climb"),
     ]
     assert [note.level for note in ranked(notes)] == [*["danger"] * 2, *["warning"] * 3, "note"]
     assert condensed(notes) == [
-        "inner race: dented by 4100 MPa",
+        "inner raceway: dented by 4100 MPa",
         "power loss: may be off by 3 %; tighten rtol; likewise cage speed",
         "whirl: may be off by 3 %, mostly scatter",
         "left out: windage",
     ]
-    assert verdict(notes) == "inner race: dented by 4100 MPa"
+    assert verdict(notes) == "inner raceway: dented by 4100 MPa"
     assert verdict(notes[1:4]) == "No danger found; 2 warnings" and verdict(notes[1:2]) == "No danger found; 1 warning"
     assert verdict(notes[:1]) == verdict([]) == "No danger found"
 

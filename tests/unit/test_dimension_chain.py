@@ -247,7 +247,7 @@ FREE = [(1, 9.0), (-1, 8.0)]
         (FREE, {"limits": (0.3, 0.2)}, "closing_link.lower_mm = 0.3: must be below upper_mm = 0.2"),
         ([(0, 9.0), (1, 8.0)], {}, 'link "a": coefficient = 0: must not be zero'),
         ([(1, 9.0, {"name": "b"}), (1, 8.0)], {}, 'link.name = "b": used 2 times'),
-        (FREE, {"adjust": "c"}, 'allocate.adjust = "c": is no link; name one of a, b'),
+        (FREE, {"adjust": "c"}, 'allocate.adjust = "c": is not a link; name one of a, b'),
         ([(1, 9.0, 0.1, 0.0, {"fixed": True}), (1, 8.0)], {"adjust": "a"}, 'adjust = "a": is fixed; name one of b'),
         ([(1, 9.0, {"fixed": True}), (1, 8.0)], {}, 'link "a": fixed = true without deviations; give'),
         ([(1, 9.0, 0.1, 0.0, {"fixed": True})], {}, "fixed = true on every link"),

@@ -83,7 +83,7 @@ def test_unit_a_life_below_the_hours_of_the_duty_is_a_danger(scene, duty, found,
         assert ("short-life" in [note.code for note in unsimulated.notes]) == short
     first, second, third = unsimulated.points
     lost = replace(unsimulated, life=None, points=(first, replace(second, L10_h=None), third))
-    assert "Life over the duty: unknown, for there is none at cruise." in text(simulated_blocks(lost))
+    assert "Life over the duty: unknown, because cruise has none." in text(simulated_blocks(lost))
 
 
 def test_closed_form_of_the_worst_point():

@@ -111,12 +111,12 @@ def test_unit_races_tell_dents_and_thin_films(make_scene, outer):
     sound = {"max_pressure_MPa": 3999.0, "lambda_ratio": 1.01}
     assert race_notes(outer, {"inner": sound, "outer": sound}) == ()
     (note,) = race_notes(outer, {"inner": sound, "outer": sound | {"max_pressure_MPa": 4001.0}})
-    assert note.startswith("outer race: dented by 4001 MPa, more than the 4000 MPa of ISO 76") and "rollers" in note
+    assert note.startswith("outer raceway: dented by 4001 MPa, more than the 4000 MPa of ISO 76") and "rollers" in note
     dents = [race_notes(outer, {"inner": {"max_pressure_MPa": pressure}})[0].code for pressure in (5311.0, 5313.0)]
     assert dents == ["dent", "overload"]
     thin = {"inner": sound | {"lambda_ratio": 0.4}, "outer": sound | {"lambda_ratio": 0.3}}
     (note,) = race_notes(outer, thin)
-    assert "lambda is 0.3 on the outer race" in note and "traction.friction = 'mixed'" in note
+    assert "lambda is 0.3 on the outer raceway" in note and "traction.friction = 'mixed'" in note
     mixed = ("traction.model=thermal_newtonian", "traction.friction=mixed")
     for changes in (mixed, ("traction.model=coulomb",), ("traction.model=off",)):
         assert race_notes(make_scene(*changes), thin) == ()

@@ -120,7 +120,7 @@ def test_unit_answer_has_tables_and_shows_itself_in_a_notebook(work, name, tmp_p
     main, *_ = tables
     assert answer.table().equals(tables[main]) and answer.table(main).equals(tables[main])
     assert all(isinstance(table, pd.DataFrame) and len(table) and len(table.columns) > 1 for table in tables.values())
-    with pytest.raises(doe.InputError, match=rf"name = 'x': is no table of this answer; choose one of {main}, "):
+    with pytest.raises(doe.InputError, match=rf"name = 'x': is not a table of this answer; choose one of {main}, "):
         answer.table("x")
     page = Text(answer._repr_html_())
     assert page.open == [] and "table" in page.tags and "script" not in page.tags

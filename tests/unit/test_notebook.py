@@ -20,7 +20,7 @@ def results(outer, outer_result):
     loss, stress = outer_result.power_loss_W, ball.report.max_stress_MPa["inner"]
     return {
         "simulation": (outer_result, f"power loss {loss.value:.1f}"[:12], "W"),
-        "ball": (ball, f"pressure, inner race {stress:.4f}"[:24], "MPa"),
+        "ball": (ball, f"pressure, inner raceway {stress:.4f}"[:27], "MPa"),
         "history": (motion, "largest pocket force", "N"),
     }
 

@@ -70,7 +70,7 @@ def test_unit_runs_that_get_longer_are_estimated_anew():
     one, stated = watched([(0, 12.0, 120.0)])
     one.lengthen(1200.0, 240.0)
     one.look(0, 24.0, 240.0)
-    assert stated[1] == "figures drift, so all runs continue to 240 shaft turns: the rest takes about 3.6 min"
+    assert stated[1] == "results drift, so all runs continue to 240 shaft turns: the rest takes about 3.6 min"
     early, first = watched([])
     early.lengthen(1200.0, 240.0)
     early.look(0, 12.0, 120.0)

@@ -107,7 +107,7 @@ def test_classes_share_out_the_whole_production(law, classes, by):
 @pytest.mark.parametrize(
     ("wish", "words"),
     [
-        ({"first": "x"}, 'selective.first = "x": is no part; name one of a, b'),
+        ({"first": "x"}, 'selective.first = "x": is not a part; name one of a, b'),
         ({"second": "a"}, 'selective.second = "a": is the first part too; name another'),
     ],
 )

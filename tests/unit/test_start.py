@@ -119,13 +119,13 @@ def test_unit_figures_of_a_start_are_responses(cold):
     assert listed == set(START_FIGURES) <= set(responses_of(heats=False))
     assert all(why_missing(_scene(start={}), key) is None for key in listed)
     assert why_missing(_scene(), "start_radial_clearance_um") == (
-        "the scene has no [thermal.start]; add that table to its file or choose another figure"
+        "the scene has no [thermal.start]; add that table to its file or choose another result"
     )
     by_rollers = {"guidance": "roller", "guide_clearance_mm": None, "pocket_radial_clearance_mm": 0.3}
     tables = _tables(start={}, cage=by_rollers)
     tables["cage"] = {key: value for key, value in tables["cage"].items() if value is not None and "land" not in key}
     scene = Scene.from_dict(tables)
-    assert why_missing(scene, "start_guide_clearance_um") == "no ring guides the cage; choose another figure"
+    assert why_missing(scene, "start_guide_clearance_um") == "no ring guides the cage; choose another result"
 
 
 def test_unit_study_names_a_start_as_the_json_does():

@@ -68,7 +68,7 @@ def foreign(path: Path, *statements: str) -> None:
 @pytest.mark.parametrize(
     ("statements", "words"),
     [
-        ((), "it is no database; move it away or name another folder"),
+        ((), "it is not a database; move it away or name another folder"),
         (("CREATE TABLE birds (name TEXT)",), "not a store of runs"),
         (
             ("CREATE TABLE runs (key TEXT PRIMARY KEY, result TEXT)",),

@@ -294,5 +294,5 @@ def test_scenes_of_the_same_laws_are_prepared_once(tmp_path, monkeypatch):
     scenes = study.design_scenes(np.array([study.centre, 1.1 * study.centre]))
     one, two = (module.simulate(scene, 1) for scene in scenes)
     assert prepared == scenes[:1]
-    # What the figures of the first run compile comes on top.
+    # What the values of the first run compile comes on top.
     assert one.cost["compile_s"] >= 1.0 and two.cost["compile_s"] == 0.0

@@ -184,7 +184,7 @@ def test_what_is_no_workbook_is_refused_in_one_sentence(tmp_path):
     """A renamed text, an old or encrypted workbook, other archives, and a workbook under a wrong name."""
     path = tmp_path / "t.xlsx"
     path.write_text("a,b,y\n1,2,3\n")
-    assert "is no Excel workbook; give a table of text a name that ends in .csv" in fault_of(path)
+    assert "is not an Excel workbook; give a table of text a name that ends in .csv" in fault_of(path)
     path.write_bytes(b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1" + bytes(600))
     assert "is an encrypted or an old workbook (.xls); save it as .xlsx without a password" in fault_of(path)
     old = tmp_path / "t.xls"
@@ -194,12 +194,12 @@ def test_what_is_no_workbook_is_refused_in_one_sentence(tmp_path):
         archive.writestr("content.xml", "<x/>")
     assert "is a damaged workbook (part _rels/.rels); open it in Excel and save it again" in fault_of(path)
     path.write_bytes(b"")
-    assert "is no Excel workbook" in fault_of(path)
+    assert "is not an Excel workbook" in fault_of(path)
     assert "is empty; write a header" in fault_of(workbook(tmp_path / "empty.xlsx", []))
     assert "has a header and no rows" in fault_of(workbook(tmp_path / "names.xlsx", [["a", "b", "y"]]))
     whole = workbook(tmp_path / "whole.xlsx", [["a", "b", "y"], [1, 2, 3]])
     (tmp_path / "whole.csv").write_bytes(whole.read_bytes())
-    assert "is no table of text; save it as .xlsx or as CSV" in fault_of(tmp_path / "whole.csv")
+    assert "is not a text table; save it as .xlsx or as CSV" in fault_of(tmp_path / "whole.csv")
     with pytest.raises(InputError, match="has no sheet 'Runs'; name one of Tabelle1"):
         read_sheet(Path(f"{whole}:Runs"))
     assert "no such file" in fault_of(tmp_path / "none.xlsx")

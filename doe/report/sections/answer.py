@@ -461,7 +461,7 @@ def motion(summary: Summary, motion: Mapping[str, DrawnMotion]) -> Section | Non
     """Orbits of the cage centre, and the moving bearing."""
     if not motion:
         return None
-    path = "Path of the cage centre about that of its guide, and enlarged; triangle start, square end."
+    path = "Path of the cage centre about the guide centre, and enlarged; triangle: start, square: end."
     caption = f"{path} The radius of the dashed circle is half of the diametral guide clearance."
     pictures = [orbit(name, run, whole).svg for whole in (True, False) for name, run in motion.items()]
     return Section("motion", "Motion of the bearing", [Figures(pictures, caption), Widget("bearing")])

@@ -54,7 +54,7 @@ def chains(summary: Summary, motion: Mapping[str, Any]) -> Section:
         blocks += [Heading(label(name)), Figures([contributions(name, chain.contributions).svg], caption)]
         blocks += chain_blocks(name, chain)
         rest = {"normal_yield": chain.normal_yield, "seed": chain.seed}
-        blocks.append(record_table(f"Further figures of the chain {label(name)}", rest, folded=True))
+        blocks.append(record_table(f"Further results of the chain {label(name)}", rest, folded=True))
     return Section("chains", "Dimension chains", blocks)
 
 

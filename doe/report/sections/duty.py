@@ -339,7 +339,7 @@ def duty_figures(summary: Summary) -> Sheet[DutyFigure]:
         for name in summary.asked.names
         if name in point.pick
     ]
-    caption = "Simulated figures at every point (95 % intervals)"
+    caption = "Simulated results at every point (95 % intervals)"
     content = "One row per response at each point of a duty."
     return Sheet(caption, DUTY_POINTS, rows, detail=Detail.ALL, file="duty_points.csv", content=content)
 

@@ -171,7 +171,7 @@ def _fit_blocks(fit: Fit, factors: Sequence[str]) -> list[Block]:
         Bullets([text[:1].upper() + text[1:] for text in sentences]),
         Figures([still.svg for still in diagnostic_plots(fit.name, runs)], caption),
         residuals.block,
-        replace(record_table(f"Further figures of {label(fit.name)}", further, folded=True), detail=Detail.ALL),
+        replace(record_table(f"Further results of {label(fit.name)}", further, folded=True), detail=Detail.ALL),
     ]
 
 

@@ -278,7 +278,7 @@ def _with_tolerances(asked: Asked, aware: ToleranceFront | None) -> list[Block]:
     sentences.append(survival.open_errors)
     if not aware.plain_pick_inside:
         sentences.append(
-            f"The tolerances of the {WITHOUT} reach out of the design region: its figures are extrapolated."
+            f"The tolerances of the {WITHOUT} reach out of the design region: its results are extrapolated."
         )
     table = Table(f"At the ends of the tolerances, {widths}: {kind}", ["point", *map(label, asked.names)], rows)
     return [table, *map(Paragraph, sentences)]

@@ -68,7 +68,7 @@ def span_sheet(runs: Sequence[RowRun]) -> Sheet[Span]:
         if numbers := [(value, run.row.name) for run in runs if (value := run.value(name)) is not None]:
             (low, low_row), (high, high_row) = min(numbers), max(numbers)
             spans.append(Span(name, low, low_row, float(np.median([value for value, _ in numbers])), high, high_row))
-    return Sheet("Figures over all rows", SPANS, spans)
+    return Sheet("Results over all rows", SPANS, spans)
 
 
 def scene_run_blocks(runs: Sequence[RowRun], part: str, notes: Notes) -> list[Block]:

@@ -192,7 +192,7 @@ def read_sheet(path: Path) -> InputTable:
         return _table(path, rows, None, "", table.note, numbers)
     data = read_bytes(file)
     if file.suffix.lower() == ".ods" or data.startswith((ARCHIVE, OLD)):
-        raise InputError([f"{path}: is no table of text; save it as .xlsx or as CSV, with that ending of its name"])
+        raise InputError([f"{path}: is not a text table; save it as .xlsx or as CSV, with that ending of its name"])
     text, encoding = _decoded(path, data)
     separator, rows = _fields(path, text)
     words = "" if separator == "," else SEPARATORS.get(separator, "")
@@ -266,7 +266,7 @@ def _decoded(path: Path, data: bytes) -> tuple[str, str]:
         except UnicodeDecodeError:
             raise InputError([f"{path}: cannot be read as UTF-16; save the file as UTF-8"]) from None
     if data[:1000].count(0) > len(data[:1000]) // 4:
-        raise InputError([f"{path}: is no text in UTF-8; save the file as UTF-8"])
+        raise InputError([f"{path}: is not text in UTF-8; save the file as UTF-8"])
     try:
         return data.decode("utf-8-sig"), ""
     except UnicodeDecodeError as error:

@@ -185,7 +185,7 @@ def read_workbook(path: Path, data: bytes, sheet: str | None) -> SheetCells:
     if data.startswith(OLD):
         raise InputError([f"{path}: is an encrypted or an old workbook (.xls); save it as .xlsx without a password"])
     if not data.startswith(ARCHIVE):
-        raise InputError([f"{path}: is no Excel workbook; give a table of text a name that ends in .csv"])
+        raise InputError([f"{path}: is not an Excel workbook; give a table of text a name that ends in .csv"])
     parts = Parts(path, data)
     book = _book(parts)
     listed = ", ".join(one_line(one.name, LONGEST_NAME) for one in book.sheets[:20])

@@ -81,5 +81,5 @@ def tables() -> dict[str, list[Sheet[Any]]]:
     ]  # fmt: skip
     return {
         "Tables of rbdyn": sheets,
-        "Figures of a roller bearing": [Sheet("", named, (), file="{figure}", content="Figures of a run, by name.")],
+        "Results of a roller bearing": [Sheet("", named, (), file="{figure}", content="Results of a run, by name.")],
     }

@@ -89,12 +89,12 @@ def race_traction(
     """
     table = scene.traction
     if table.elasticity and not contact.entrainment_speed > ROLLING:
-        raise InputError(["traction.elasticity = true: needs contacts that roll, but the races do not; leave it out"])
+        raise InputError(["traction.elasticity = true: needs contacts that roll, which raceways do not; leave it out"])
     if table.model not in RHEOLOGIES and table.friction == "film":
         return _load_independent(scene)
     if not contact.entrainment_speed > ROLLING:
         key = f"traction.model = '{table.model}'" if table.model in RHEOLOGIES else "traction.friction = 'mixed'"
-        raise InputError([f"{key}: needs a film, but the races do not roll; choose another"])
+        raise InputError([f"{key}: needs a film, but the raceways do not roll; choose another"])
     law = _surface(scene, race, contact, oil, largest_load) if table.model in RHEOLOGIES else _load_independent(scene)
     return _mixed(scene, law, contact, oil) if table.friction == "mixed" else law
 

@@ -357,8 +357,8 @@ def traction_law_notes(scene: Scene, slip: float) -> Notes:
     if slip < NOTED_SLIP or scene.traction.model == "off" or not others:
         return ()
     sentence = (
-        f"cage slip: {100.0 * slip:.2g} % depends on {LAW} = '{scene.traction.model}', and so does its change with temperature "
-        f"and clearance; compare {' and '.join(map(repr, others))}, which doe uncertainty draws where [uncertain] names the key"
+        f"cage slip: {100.0 * slip:.2g} % depends on {LAW} = '{scene.traction.model}' (as does its change with temperature "
+        f"and clearance). Compare {' and '.join(map(repr, others))}, which doe uncertainty draws where [uncertain] names the key"
     )
     return (Note("traction-law", sentence),)
 

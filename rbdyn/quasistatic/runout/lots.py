@@ -62,7 +62,7 @@ def linear_response(row: Row, control: Control, load: Array, constraint: Array |
             "load: the linear response of runout needs a purely axial load; set the other components to 0"
         )
     if any(np.ptp(getattr(row, name)) > 0.0 for name in CHANGES):
-        raise MethodError("row: its balls or races already have errors; give the nominal row")
+        raise MethodError("row: its balls or raceways already have errors; give the nominal row")
     middle = _equilibrium(solve(row, control, load, constraint))
     slopes = []
     for name in CHANGES:
@@ -383,7 +383,7 @@ def _largest_limits(shares: Array, read: Readings, allowed: Array, target_yield:
     low, high = 0.0, float(allowed[0])
     while passes(high):
         if high > 1e6 * allowed[0]:
-            raise MethodError("no order of these race errors reaches the ring; give the lot more orders")
+            raise MethodError("no order of these raceway errors reaches the ring; give the lot more orders")
         low, high = high, 2.0 * high
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
