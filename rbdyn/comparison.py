@@ -124,7 +124,7 @@ DIFFERENCES: tuple[Column[tuple[str, Difference]], ...] = (
 
 def difference_sheet(figures: Mapping[str, Difference]) -> Sheet[tuple[str, Difference]]:
     """A row a figure."""
-    content = "One row per result of `rbdyn compare`, those of the parts last."
+    content = "One row per result of `rbdyn compare`, parts last."
     return Sheet("", DIFFERENCES, tuple(figures.items()), file="differences.csv", content=content)
 
 

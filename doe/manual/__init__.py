@@ -98,7 +98,7 @@ def chain(scene: "Scene") -> Sketch:
     caption = (
         "A dimension chain: arrows to the right are links with the coefficient +1, arrows to the left are taken away. What closes "
         f"the loop is the closing link, here the radial clearance of the {scene.bearing.designation}, all in mm on the diameter. "
-        f"It is drawn {_round(CLOSING / (scale * group.clearance)):g} times as long as the parts are."
+        f"The closing link is drawn {_round(CLOSING / (scale * group.clearance)):g} times as long as the parts are."
     )
     return Sketch(canvas.svg(), caption)
 

@@ -203,7 +203,7 @@ def _result(parts: _Parts, scale: float, ratios: Array) -> WidestTolerances:
     interval, (promise, open_errors) = parts.interval(half), parts.texts
     within = f"Within these tolerances {percent(share)} % ({interval.words}) of the parts {promise}; {parts.percent} are required."
     rim = "Where a tolerance ends at the bound of the region, no run shows whether it may be wider."
-    sentences = [within, f"They are limited by {limit}.", open_errors, rim if at_rim.any() else ""]
+    sentences = [within, f"These tolerances are limited by {limit}.", open_errors, rim if at_rim.any() else ""]
     return WidestTolerances(half, share, error, interval, limit, at_rim, " ".join(filter(None, sentences)))
 
 

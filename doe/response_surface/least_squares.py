@@ -361,4 +361,4 @@ def _sentence(name: str, best: float, interval: list[float], recommended: float)
     if recommended == 1.0:
         return f"{estimate}, beyond all usual exponents. Fit the response itself, and check for an outlier or a missing term."
     power = NAMES.get(recommended, f"y^{recommended:.3g}")
-    return f"{estimate}. It does not contain 1: fit {power} instead of y (transform = {recommended:.3g})."
+    return f"{estimate}. The interval excludes 1: fit {power} instead of y (transform = {recommended:.3g})."

@@ -106,7 +106,7 @@ def describe_canonical(analysis: Canonical, place: StationaryPoint | None) -> st
     """Canonical analysis in a sentence."""
     values = ", ".join(f"{value:.3g}" for value in analysis.eigenvalues)
     if place is None:
-        return f"there is no single stationary point, because one direction has no curvature (eigenvalues {values})."
+        return f"no single stationary point exists, because one direction has no curvature (eigenvalues {values})."
     where = ", ".join(f"{letter} = {x:.3g}" for letter, x in zip(ascii_uppercase, place.coded, strict=False))
     region = "inside" if analysis.inside else "outside"
     head = f"the stationary point at {where} (coded), {region} the region of the runs, is a {analysis.nature}"

@@ -358,7 +358,7 @@ def duty_faults(
         )
         return
     if not has_scene:
-        yield "duty: there is no scene whose keys it can set; add [scene]"
+        yield "duty: it needs a scene to set its keys; add [scene]"
     yield from point_faults(points, normalise, claims)
     names = [point.name for point in points]
     for name, response in responses.items():

@@ -135,7 +135,7 @@ class StudyFile(Consistent):
     duty: list[DutyPoint] = []
     """Operating points at which every run is simulated, up to 12. Default: the operating point of the scene file."""
     normalise_shares: bool = False
-    """Whether the shares can have any sum, such as hours. They are then divided by their sum."""
+    """Whether the shares can have any sum, such as hours. If true, each share is divided by the sum."""
     factor: Annotated[list[Factor], Field(min_length=1, max_length=MOST_FACTORS)]
     """Factors that the study varies."""
     response: Annotated[list[Response], Field(min_length=1)]

@@ -178,7 +178,7 @@ def out_of_reach(study: Problem, point: Array, violations: Array, suffix: str = 
     position = ", ".join(f"{name} = {x:.5g}" for name, x in study.by_factor(point).items())
     return OutOfReachError(
         [
-            f"{study.path}: response.lower, response.upper: no point of the region keeps all limits{suffix}; the closest "
+            f"{study.path}: response.lower, response.upper: no point of the region meets all limits{suffix}. The closest "
             f"({position}) misses {excess}; loosen a limit or widen the design"
         ]
     )

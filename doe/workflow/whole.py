@@ -446,8 +446,8 @@ def _searched(
         return find_adaptive(study, runs, simulations), []
     except OutOfReachError:
         sentence = (
-            "the adaptive search ended without a front, because nothing that it predicts is likely to keep all limits; the pick is "
-            "that of the surfaces"
+            "the adaptive search ended without a front, because no predicted point is likely to meet all limits; the selected design is "
+            "taken from the surfaces"
         )
         return None, [Note("advice", sentence)]
     finally:

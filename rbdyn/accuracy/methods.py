@@ -487,7 +487,7 @@ def conclusion(attempts: Sequence[Attempt], ratios: dict[str, Speedup], floor: f
     sentences = []
     if ratios:
         faster = ", ".join(
-            f"{ratio.mean:.2g} ({ratio.least:.2g} to {ratio.greatest:.2g}) times that of {name}"
+            f"{ratio.mean:.2g} ({ratio.least:.2g} to {ratio.greatest:.2g}) times the speed of {name}"
             for name, ratio in ratios.items()
         )
         sentences.append(

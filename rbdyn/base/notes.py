@@ -32,7 +32,7 @@ CODES: dict[str, Code] = {
     "seizure": Code(DANGER, "the cage or the bearing seizes at its temperatures, or a clearance in operation is nearly lost"),
     "overload": Code(DANGER, "pressure above the shakedown limit: no elastic theory holds, and the results apply to no real bearing"),
     "heat": Code(DANGER, "a loss that no flow of oil removes, or temperatures without a steady state or above a ceiling"),
-    "failed": Code(DANGER, "there is no answer: no equilibrium, or a search that failed"),
+    "failed": Code(DANGER, "no answer: no equilibrium, or a search that failed"),
     "dent": Code(DANGER, "pressure that dents a raceway by the rule of ISO 76"),
     "overspeed": Code(DANGER, "speed beyond twice the reference speed"),
     "short-life": Code(DANGER, "life below the hours of the duty"),

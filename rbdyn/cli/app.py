@@ -146,7 +146,7 @@ def accuracy(
         str | None,
         typer.Argument(
             metavar="[tolerances|methods|coverage|options|stability]",
-            help="Error by tolerance; other integrators (or ball solver); coverage of intervals; cost of options; extreme variants.",
+            help="Error by tolerance, other integrators or ball solver, coverage of intervals, cost of options, or extreme variants.",
             show_default="tolerances; methods of a ball bearing",
         ),
     ] = None,

@@ -224,7 +224,7 @@ def _temperatures(result: SimulationResult) -> list[Block]:
     inputs = ", ".join(balance.get("inputs", ()))
     return [
         Table("", header, rows),
-        Paragraph(f"{state}; gain of heat and temperature {balance['gain']:+.2f}; removed: {ways}"),
+        Paragraph(f"{state}; thermal loop gain {balance['gain']:+.2f}; removed: {ways}"),
         *([Paragraph(other_ranges(ranges))] if ranges else []),
         *([Paragraph(f"inputs that vary: {inputs}", detail=Detail.ALL)] if inputs else []),
     ]

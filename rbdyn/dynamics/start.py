@@ -557,8 +557,8 @@ def _notes(machine: Machine, start: StartResult, distance: float) -> Notes:
         notes.append(Note("undecided", f"start: a part seizes in {share}"))
     if distance > FAR:
         sentence = (
-            f"start: after {MOST_SIMULATIONS} short simulations some moments are {distance:.2g} times as far apart as meant; the errors "
-            "of its figures count that"
+            f"start: after {MOST_SIMULATIONS} short simulations some moments are {distance:.2g} times as far apart as intended; the errors "
+            "of its results include that"
         )
         notes.append(Note("numerical-error", sentence))
     return tuple(notes)

@@ -115,7 +115,7 @@ def clearances(scene: "Scene") -> Sketch:
     canvas.words(paper(-below[0], below[1] + 0.1 * d.roller), "cage")
     sizes_in_words = [
         f"1: radial clearance, {scene.bearing.radial_clearance_mm:g} mm on the diameter, a quarter of it at each of the four gaps between "
-        f"roller and race along a diameter; drawn {factors['radial']:g} times as wide.",
+        f"roller and raceway along a diameter; drawn {factors['radial']:g} times as wide.",
         f"2: pocket clearance, {scene.cage.pocket_clearance_mm:g} mm, half of it at each wall; drawn {factors['pocket']:g} times as wide.",
     ]
     if d.guide_side:

@@ -68,7 +68,7 @@ MEANINGS = {
     "start_radial_clearance_um start_inner_minus_outer_K": "with `[thermal.start]`: least clearance, largest lead of the inner ring",
     "start_axial_load_N start_contact_pressure_MPa": "with `[thermal.start]`: largest axial load and contact pressure",
     "middle_ring_speed_rpm": "of a double-decker: speed of the middle ring",
-    "residual_N": "what the equations leave over",
+    "residual_N": "residual of the equations",
     "iterations": "steps of the solver",
     "status": "ok, or why there is no equilibrium or no steady temperature",
     "notes": "topics of the notes on this point",

@@ -476,7 +476,7 @@ def starvation_note(hot: SingleRowScene, subject: str) -> Notes:
     if rest >= STARVED:
         return ()
     sentence = (
-        f"{subject}: SKF's starvation factor of {rest:.2g} removes the rolling friction of so thick an oil; the heat is "
-        "too low; take a thinner oil or warm it"
+        f"{subject}: SKF's starvation factor of {rest:.2g} removes the rolling friction of so thick an oil, so the heat is "
+        "too low. Take a thinner oil or warm it"
     )
     return (Note("starved", sentence),)

@@ -55,7 +55,7 @@ class BallRow(Consistent):
     """Static load rating: the load at which the most loaded ball has a pressure of 4200 MPa (ISO 76). Default: calculated from
     the dimensions by Hertz."""
     inner_shoulder_height_mm: Positive | None = None
-    """Height of the inner-ring shoulder above the groove bottom. It is half the difference between the catalogue's shoulder
+    """Height of the inner-ring shoulder above the groove bottom. Take half the difference between the catalogue's shoulder
     diameter and the raceway diameter. Default (estimate): 0.2 ball diameters. Example: a spindle bearing of 15 degrees (pitch
     18 mm, balls 4.485 mm, shoulders 15.74 and 21.4 mm) has 0.25 ball diameters inside and 0.12 outside. For contact angles
     above about 32 degrees the default reaches 20 degrees beyond the contact angle. Effect: a note warns if a contact ellipse
@@ -527,17 +527,17 @@ def _unmounted_faults(scene: BallScene) -> Iterator[str]:
     prefix = ("bearing.", "bearing.") if inner is outer else ("bearing.inner.", "bearing.outer.")
     if operation.inner_speed_rpm != 0.0 and inner.bore_mm is None:
         yield (
-            f"{prefix[0]}bore_mm: missing; the growth of the rotating inner ring needs it; add it, or set "
+            f"{prefix[0]}bore_mm: missing, but the rotating inner ring needs it to expand; add it, or set "
             "model.ring_expansion = false"
         )
     paper = scene.model.ring_expansion_form == "paper"
     if operation.outer_speed_rpm != 0.0 and outer.outside_diameter_mm is None and not paper:
         yield (
-            f"{prefix[1]}outside_diameter_mm: missing; the growth of the rotating outer ring needs it; add it, or set "
+            f"{prefix[1]}outside_diameter_mm: missing, but the rotating outer ring needs it to expand; add it, or set "
             "model.ring_expansion = false"
         )
     if paper and inner is not outer and outer.bore_mm is None:
-        yield "bearing.outer.bore_mm: missing; model.ring_expansion_form = 'paper' uses it for the middle ring; add it"
+        yield "bearing.outer.bore_mm: missing, but model.ring_expansion_form = 'paper' needs it for the middle ring; add it"
 
 
 def _mounted_faults(mounting: Mounting, scene: BallScene) -> Iterator[str]:
@@ -577,7 +577,7 @@ def _thermal_faults(scene: BallScene) -> Iterator[str]:
         yield "[thermal]: balances the heat of a single row of balls, not of two; remove the table"
         return
     if scene.lubricant is None:
-        yield "lubricant: missing; [thermal] needs the oil, whose viscosity decides the friction; add the table"
+        yield "lubricant: missing, but [thermal] needs its viscosity for the friction; add the table"
         if scene.mounting is None:
             yield NO_MOUNTING
     if scene.operation.inner_speed_rpm == scene.operation.outer_speed_rpm:

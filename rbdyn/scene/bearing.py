@@ -262,9 +262,9 @@ class Cage(Consistent):
     land_width_mm: Positive = 3.0
     """Width of one guide land."""
     bar_width_mm: Positive | None = None
-    """Width of a cage bar along the circumference, at the pitch circle. It does not change with cage.pocket_clearance_mm.
-    Effect: bar width, bar thickness, bar length and side ring width together give the stiffness of a bar
-    (rbdyn/contact/cage_bar.py), unless model.pocket_bar_stiffness_N_m is set."""
+    """Width of a cage bar along the circumference, at the pitch circle. The width does not change with
+    cage.pocket_clearance_mm. Effect: bar width, bar thickness, bar length and side ring width together give the stiffness of a
+    bar (rbdyn/contact/cage_bar.py), unless model.pocket_bar_stiffness_N_m is set."""
     bar_thickness_mm: Positive | None = None
     """Radial thickness of the cage bars and of the side rings."""
     bar_length_mm: Positive | None = None

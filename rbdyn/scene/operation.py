@@ -63,7 +63,8 @@ class Operation(Consistent):
     unbalance_g_mm: NonNegative = 0.0
     """Unbalance of the shaft; its force grows with the square of the speed."""
     gravity_m_s2: NonNegative = 0.0
-    """Acceleration of gravity, 9.81 where it matters. It is off by default: weights are small compared with centrifugal forces."""
+    """Acceleration of gravity, 9.81 where it matters. Default: off, because weights are small compared with centrifugal
+    forces."""
     gravity_direction_deg: float = 0.0
     """Direction of gravity, measured from the load."""
     schedule: Schedule | None = None

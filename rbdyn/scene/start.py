@@ -70,8 +70,8 @@ class Start(Strict):
     from_C: OilCelsius | None = None  # noqa: N815
     """Temperature of all parts and of the oil at the start. Default: thermal.ambient_C."""
     from_parts_C: Annotated[list[OilCelsius], Field(min_length=6, max_length=6)] | None = None  # noqa: N815
-    """Temperatures of oil, outer ring, inner ring, rollers, housing and shaft at the start, instead of from_C. They can come
-    from the result at another operating point."""
+    """Temperatures of oil, outer ring, inner ring, rollers, housing and shaft at the start, instead of from_C. For example,
+    use the temperatures of a result at another operating point."""
     from_point: dict[str, Any] | None = None
     """Keys of the scene with their values at another operating point, such as {"operation.inner_speed_rpm" = 800}, instead of
     from_C. The machine begins with the steady temperatures of that point."""

@@ -88,8 +88,8 @@ class Thermal(Sparse):
     """Factor on the heat conducted through the raceway contacts, which follows from conductivity and heat capacity of the
     parts."""
     oil_share: Share = 1.0
-    """Share of lubricant.oil_flow_l_min that enters the bearing. The outer ring of a 35 mm bearing with jets stayed within 12 K
-    of what the whole flow would have (NASA TP-2275)."""
+    """Share of lubricant.oil_flow_l_min that enters the bearing. The outer ring of a 35 mm bearing with jets stayed within 12
+    K of the temperature that the whole flow gives (NASA TP-2275)."""
     shaft_lag: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.125
     """Share of the inner ring's rise above ambient by which the shaft stays below the ring: 0.10 to 0.15 (NSK)."""
     cage_offset_K: Annotated[float, Field(ge=-100.0, le=100.0)] = 0.0  # noqa: N815
@@ -249,8 +249,8 @@ def _cold_films(mounting: Mounting) -> Iterator[str]:
     absent = [f"mounting.{key}" for key in RING_TEMPERATURES if getattr(mounting, key) is None]
     if absent:
         yield (
-            f"lubricant.film_temperature = 'parts': needs {' and '.join(absent)}, or the films are as cold as the drawing; state "
-            "what is missing or write 'oil'"
+            f"lubricant.film_temperature = 'parts': needs {' and '.join(absent)}, or the films are as cold as the drawing; add "
+            "these keys or write 'oil'"
         )
 
 

@@ -60,7 +60,7 @@ def table(folder: Path, text: str | bytes):
         ("a,b,y\n1,2,2026-02-01\n", "y in row 1 = '2026-02-01': is a date, which Excel makes of numbers such as 1.2"),
         ("a,b,y\n1,2,01. Feb\n", "y in row 1 = '01. Feb': is a date, which Excel makes of numbers such as 1.2"),
         ("a,b,y\n1,2,#DIV/0!\n", "y in row 1 = '#DIV/0!': is the fault of a formula; correct it in the spreadsheet"),
-        ("Versuch 12,,\na,b,y\n1,2,3\n", "names columns such as 'a' below another row; remove what is above the names"),
+        ("Versuch 12,,\na,b,y\n1,2,3\n", "names columns such as 'a' below another row; remove the rows above the names"),
         ("a,b,y\n1,5,2,5,3,5\n", "row 1 has 6 fields and the header 3; give it a field for each column, in their order, or save it with semicolons"),
         ("a;b;y\n1;2;3\n".encode("utf-16-le"), "is not text in UTF-8; save the file as UTF-8"),
         ("a,b,y\nmm,mm,N\n1,2,3\n", "row 1 has words where the others have numbers, such as 'mm'; remove that row of units"),

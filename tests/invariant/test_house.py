@@ -16,7 +16,7 @@ SOURCES = [path for package in ("rbdyn", "doe") for path in (ROOT / package).rgl
 LONGEST_FILE, LONGEST_FUNCTION, MOST_AT_THE_ROOT = 600, 70, 6
 # Lines of code of both packages. A change may lower this freely. Raise it only with the feature that needs it, and say by
 # how much in the commit.
-MOST_CODE = 49_404
+MOST_CODE = 49_408
 TOP = {
     ".ci",
     ".gitignore",
@@ -349,18 +349,18 @@ def test_invariant_messages_are_short_sentences():
 
 # Shapes that make a sentence hard to read, each with the most that messages and keys may have, and docstrings. Counts may only fall.
 SHAPES = {
-    r"\b(?:that|those) of\b": (5, 304),
-    r"(?<![.?!] )\bwhat (?:the|a|its|it|they|is|are|was|stands?|fits|few|follows|goes)\b": (5, 138),
+    r"\b(?:that|those) of\b": (2, 304),
+    r"(?<![.?!] )\bwhat (?:the|a|its|it|they|is|are|was|stands?|fits|few|follows|goes)\b": (0, 138),
     r", for (?:it|they|this|no|any|its|there|those|free|then)\b": (0, 8),
     r"(?:^|[.!?] )So\b(?! that)|\band so (?:has|is|are|does)\b": (0, 29),
-    r"\b(?:is|are) no (?!longer|more|less|equilibrium|steady)\w+": (3, 47),
-    r"(?:^|[.!?] )(?:It|They|This|That|These|Those) (?:is|are|has|does|can|needs?|takes?|shows?)\b": (9, 50),
+    r"\b(?:is|are) no (?!longer|more|less|equilibrium|steady)\w+": (0, 47),
+    r"(?:^|[.!?] )(?:It|They|This|That|These|Those) (?:is|are|has|does|can|needs?|takes?|shows?)\b": (1, 50),
     r"(?:\bof\b[^.!?]*){4}": (1, 147),
-    r"(?:;[^.!?;]*){2}": (18, 148),
+    r"(?:;[^.!?;]*){2}": (12, 148),
     r"\bplay\b": (0, 11),
-    r"(?<!-)\braces?\b(?!\.|-)": (3, 184),
-    r"(?<![<{/-])\b[Ff]igures?\b(?![}>])": (5, 268),
-    r"(?<!\.)\b[Pp]icks?\b(?! =)": (72, 198),
+    r"(?<!-)\braces?\b(?!\.|-)": (2, 184),
+    r"(?<![<{/-])\b[Ff]igures?\b(?![}>])": (4, 268),
+    r"(?<!\.)\b[Pp]icks?\b(?! =)": (71, 198),
 }
 
 

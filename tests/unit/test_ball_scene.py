@@ -114,7 +114,7 @@ def test_unit_faults_of_the_operation(name):
         ({"model": {"friction_limit": 20.0}}, ("model.friction_limit = 20", "at most 10")),
         ({"model": {"solver": "guess"}}, ("model.solver = 'guess'", "'convex'")),
         ({"materials": {"ball": "chees"}}, ("materials.ball = 'chees'", "choose one of")),
-        ({"model": {"ring_expansion": True}}, ("bearing.bore_mm: missing", "the growth of the rotating inner ring", "model.ring_expansion = false")),
+        ({"model": {"ring_expansion": True}}, ("bearing.bore_mm: missing", "the rotating inner ring needs it", "model.ring_expansion = false")),
         ({"cage": {"mass_g": 3.0}}, ("cage: unknown key",)),
         ({"errors": {"ball_diameter_errors_um": [1.0]}}, ("errors.ball_diameter_errors_um", "1 value for 29 balls")),
     ],

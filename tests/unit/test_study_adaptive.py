@@ -252,7 +252,7 @@ def test_faults_are_one_sentence_each(tmp_path, monkeypatch):
         'name = "power_loss_W"\nmodel = "quadratic"\nupper = -5.0\n',
     )
     with pytest.raises(
-        InputError, match=r"no point of the region keeps all limits; the closest .* misses power_loss_W <= -5"
+        InputError, match=r"no point of the region meets all limits. The closest .* misses power_loss_W <= -5"
     ):
         search(written(tmp_path / "limit", limit), tmp_path / "limit", 1)
 
@@ -269,7 +269,7 @@ def test_advice_where_surfaces_miss_more_than_noise():
         study.with_surfaces(fit_surfaces(study, type(runs)(runs.coded, runs.actual, bent, runs.errors)))
     )
     assert "lack of fit is significant for impact_force_N" in sentence
-    assert "in 80 runs beyond the 20 of the design" in sentence
+    assert "needs 80 more runs" in sentence
     smooth = 5.0 + runs.coded @ np.ones((3, 3)) + np.random.default_rng(1).normal(0.0, 0.1, runs.values.shape)
     assert (
         advice(study.with_surfaces(fit_surfaces(study, type(runs)(runs.coded, runs.actual, smooth, runs.errors)))) == []

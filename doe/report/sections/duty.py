@@ -319,7 +319,7 @@ DUTY_POINTS: tuple[Column[DutyFigure], ...] = (
         "own_pick_percent",
         at=("cost", "percent"),
         screen=False,
-        meaning="what the compromise costs: gain of the pick for this point alone on the study's pick, by its surfaces, and its half width",
+        meaning="cost of the compromise: gain of the pick for this point alone on the study's pick, by its surfaces, and its half width",
     ),
     Column("own_pick_error_percent", at=("cost", "error_percent"), screen=False),
     Column(

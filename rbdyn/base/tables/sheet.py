@@ -382,7 +382,7 @@ def _refuse_words(path: Path, header: list[str], body: list[list[str]]) -> None:
         return
     if sum(bool(name.strip()) for name in header) < len(words):
         raise InputError(
-            [f"{path}: names columns such as {words[0]!r} below another row; remove what is above the names"]
+            [f"{path}: names columns such as {words[0]!r} below another row; remove the rows above the names"]
         )
     raise InputError(
         [f"{path}: row 1 has words where the others have numbers, such as {words[0]!r}; remove that row of units"]
