@@ -26,13 +26,16 @@ from rbdyn.base.command import (
 )
 from rbdyn.base.faults import InputError, MethodError
 from rbdyn.base.tables.sheet import listed
+from rbdyn.base.words import counted
 from rbdyn.clearances import CLEARANCES
 
 if TYPE_CHECKING:
     from doe.commands.new_parts import Manufacture
+    from doe.workflow.effort import Effort
     from doe.workflow.problem import Problem
     from rbdyn.scene import Scene
     from rbdyn.scene.duty import DutyPoint
+    from rbdyn.verdict.replicates import CageVerdict
 
 
 RESOLUTION_MM, SMALLEST_STEP_MM = 0.001, 0.002
@@ -52,6 +55,12 @@ HINT = """# Add to a factor: tolerance = 0.005, the half width that can be manuf
 # [tolerances] count with it. A response may have limits: upper = 100.0. Chains of dimensions: [[chain]]."""
 LIMIT = re.compile(r"\s*([^<>=\s]+)\s*(<=|>=|=)\s*([^<>=]+?)\s*")
 CAGE_CLASS = "cage.verdict"
+WHIRL, IMPACT_POWER = "whirl_deviation_ratio", "pocket_impact_power_W"
+# What the run for the class of the cage has besides the settings of the study's runs; its replicates are as few as name a class.
+CAGE_RUN = ("numerics.discard_turns=10", "numerics.extend=false")
+HELD = """# Cage: held in a short run of the scene, so its whirl ratio means little and the impact power is a goal instead.
+# You can still name the whirl ratio: [[response]] with name = "whirl_deviation_ratio" and goal = "min".
+"""
 BOUNDS = {"<=": "upper", "=": "upper", ">=": "lower"}
 POINT = """[[duty]]
 name = {name}
@@ -113,36 +122,71 @@ def new(
         from rbdyn.base.faults import read_toml, validated
         from rbdyn.scene import DrawnScene, rollers_only
 
-        reads = [path, *([duty] if duty else [])]
-        check_out(out, force, reads)
-        responses = _responses(limits_of(limit or [])) + _class_limit(limit or [])
+        check_out(out, force, reads := [path, *([duty] if duty else [])])
+        limits, class_limit = limits_of(limit or []), _class_limit(limit or [])
         scene = rollers_only(DrawnScene.load(path))
-        template = Path(__file__).with_name("new_study.toml").read_text(encoding="utf-8")
         points, hours = _duty(duty, scene)
-        sections = {"responses": responses, "duty": points, "baseline": ""}
+        sections = {"responses": _responses(limits) + class_limit, "duty": points, "baseline": ""}
         factors = _factors(read_toml(path))
         # A study finds its scene from its own folder.
         base = path if out is None else Path(os.path.relpath(path.resolve(), out.resolve().parent))
 
         def written(factors: list[Factor]) -> tuple[str, Problem]:
-            text = template
+            text = Path(__file__).with_name("new_study.toml").read_text(encoding="utf-8")
             for name, section in {**_sections(scene, factors, tolerances, chains), **sections}.items():
                 text = text.replace(f"{{{name}}}", section)
             text = fill_template(text, {"quoted": json.dumps(str(base)), "hours": "true" if hours else None})
-            return text, Problem(
-                out or Path("study.toml"), validated(StudyFile, tomllib.loads(text), f"study of {path}")
-            )
+            file = validated(StudyFile, tomllib.loads(text), f"study of {path}")
+            return text, Problem(out or Path("study.toml"), file)
 
         text, study = written(factors)
         check_goals(study)
+        effort = Effort(notice=notice(False))
         with tempfile.TemporaryDirectory() as folder:
-            moved = region_that_runs(study, Path(folder), Effort(notice=notice(False)), kept=1.0).study
-        if moved is not study:
-            if (moved.baseline != moved.centre).any():
-                sections["baseline"] = BASELINE.format(values="\n".join(_assigned(moved.file.baseline)))
-            text, study = written(_moved(factors, study, moved))
+            moved = region_that_runs(study, Path(folder), effort, kept=1.0).study
+            if moved is not study:
+                sections["baseline"], factors = _baseline(moved), _moved(factors, study, moved)
+                text, study = written(factors)
+            if _is_held(baseline_cages(study, Path(folder), effort)):
+                sections["responses"] = HELD + _responses(limits, {WHIRL: IMPACT_POWER}) + class_limit
+                text, study = written(factors)
         check_study(study)
         hand_out(text, as_json, out, force, "doe study", reads)
+
+
+def baseline_cages(study: "Problem", folder: Path, effort: "Effort") -> "dict[str, CageVerdict]":
+    """Class of the cage at the baseline by point of the duty, by a short run; empty where none traces it, or the run fails.
+
+    Raises InputError before it for a study that cannot run.
+    """
+    from doe.duty import cages_of, scenes_of
+    from doe.running.store import Failure
+    from doe.workflow.whole import check_study
+    from rbdyn.dynamics.figures import why_missing
+
+    check_study(study)
+
+    def scene(sets: Sequence[str]) -> "Scene":
+        bare = study.scene_at(study.baseline, study.file.design.seed, sets, confirms=True)
+        effort = [f"numerics.replicates={bare.verdict.limits.fewest_replicates}", *CAGE_RUN]
+        return study.scene_at(study.baseline, study.file.design.seed, [*sets, *effort], confirms=True)
+
+    run = study.over_duty(scene)
+    scenes = scenes_of(run)
+    if any(scene.cage_sample_s is None or why_missing(scene, IMPACT_POWER) for scene in scenes):
+        return {}
+    if effort.notice is not None:
+        numerics = scenes[0].numerics
+        turns = numerics.replicates * (numerics.turns + numerics.warm_up_turns)
+        effort.notice(f"{counted(len(scenes), 'short run')} of {turns:g} shaft turns for the class of the cage")
+    with effort.simulations(folder, study.path) as simulations:
+        (result,) = simulations.run([run], ["baseline"], simulations.progress("class of the cage"))
+    return {} if isinstance(result, Failure) else cages_of(result)
+
+
+def _is_held(cages: "Mapping[str, CageVerdict]") -> bool:
+    """Whether the cage is held, at every point of a duty."""
+    return bool(cages) and all(cage.name == "held" for cage in cages.values())
 
 
 def limits_of(texts: Sequence[str]) -> Limits:
@@ -194,11 +238,12 @@ def _class_limit(texts: Sequence[str]) -> str:
     return "\n".join(["\n[limits]", *(f"cage.verdict = {_quoted(text)}" for text in classes), ""]) if classes else ""
 
 
-def _responses(limits: Limits) -> str:
-    """The responses that a study improves, and those that are watched because they have limits."""
+def _responses(limits: Limits, instead: Mapping[str, str] | None = None) -> str:
+    """The responses that a study improves, some by another one ``instead``, and those that are watched because they have limits."""
     from rbdyn.dynamics.figures import FIGURES
 
-    improved = dict.fromkeys((figure.key for figure in FIGURES if figure.judged == "target"), 'goal = "min"')
+    keys = (figure.key for figure in FIGURES if figure.judged == "target")
+    improved = dict.fromkeys(((instead or {}).get(key, key) for key in keys), 'goal = "min"')
     goals = dict.fromkeys(limits, 'goal = "none" # watched, with its limits only') | improved
     return "\n".join(_response(name, limits.get(name, {}), goals[name]) for name in improved | goals)
 
@@ -286,5 +331,7 @@ def _moved(factors: list[Factor], before: "Problem", after: "Problem") -> list[F
     return moved
 
 
-def _assigned(values: Mapping[str, float]) -> list[str]:
-    return [f"{name} = {value!r}" for name, value in values.items()]
+def _baseline(study: "Problem") -> str:
+    """The table of a baseline that is not the centre of the region."""
+    values = "\n".join(f"{name} = {value!r}" for name, value in study.file.baseline.items())
+    return BASELINE.format(values=values) if (study.baseline != study.centre).any() else ""

@@ -216,11 +216,11 @@ def _surfaces(study: "Problem", data: Path | None, out: Path | None, effort: Eff
     Raises InputError, RunError, KeyboardInterrupt.
     """
     from doe.workflow.region import region_that_runs
-    from doe.workflow.runs import read_runs, run_design, with_remaining
-    from doe.workflow.surfaces import fit_surfaces
+    from doe.workflow.runs import run_design, with_remaining
+    from doe.workflow.surfaces import fit_surfaces, shared_runs
 
     if data is not None:
-        runs = read_runs(study, data)
+        study, runs = shared_runs(study, data, study.responses, "missing-column", "left out")
         return study.with_surfaces(fit_surfaces(study, runs)), runs.notes
     with effort.folder(out) as folder:
         study, notes = region_that_runs(study, folder, effort)

@@ -82,7 +82,7 @@ class Still:
 
 
 def save(stills: Sequence[Still], path: Path) -> None:
-    """The pictures in rows of three as one PNG, of four in two rows; all as large as the first."""
+    """The pictures in rows of three as one PNG, of four in two rows; all as wide as the first."""
     import matplotlib
 
     with matplotlib.rc_context(STYLE):
@@ -99,13 +99,13 @@ def _figure(stills: Sequence[Still], columns: int) -> Any:
     from matplotlib.ticker import MaxNLocator
 
     first, columns = stills[0], min(columns, len(stills))
-    rows = -(-len(stills) // columns)
-    wide, high = first.width * columns, first.height * rows
+    heights = [max(still.height for still in stills[at : at + columns]) for at in range(0, len(stills), columns)]
+    wide, high = first.width * columns, sum(heights)
     figure = Figure(figsize=(wide / 72.0, high / 72.0))
     for place, still in enumerate(stills):
         row, column = divmod(place, columns)
         near, upper, right, lower = still.frame
-        corner = (column * first.width + near) / wide, ((rows - row) * first.height - lower) / high
+        corner = (column * first.width + near) / wide, (sum(heights[row:]) - lower) / high
         axis = figure.add_axes((*corner, (right - near) / wide, (lower - upper) / high))
         for side in (axis.xaxis, axis.yaxis):
             side.set_major_locator(MaxNLocator(5, steps=[1, 2, 5, 10]))

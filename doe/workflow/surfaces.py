@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
+from pathlib import Path
 from string import ascii_uppercase
 from typing import Any
 
@@ -159,6 +160,19 @@ def _verdict(response: str, level: float, effects: Mapping[str, Effect], rank_co
     return f"{response}: our mean is {level:.2f} of theirs; {signs}; rank correlation {rank_correlation:+.2f}."
 
 
+def shared_runs(study: Problem, path: Path, names: Sequence[str], code: str, left: str) -> tuple[Problem, Runs]:
+    """The study with those of the responses ``names`` that a table has, and its runs; a note of this ``code`` says that the others are ``left``.
+
+    Raises InputError, also for a table without any of them.
+    """
+    sheet = read_sheet(path)
+    missing = [name for name in names if name not in sheet]
+    study = study.with_responses([name for name in names if name in sheet] or names)
+    sentence = f"{path} has no column of {', '.join(missing)}, which {are(len(missing))} {left}"
+    runs = read_runs(study, path)
+    return study, replace(runs, notes=(*runs.notes, *([Note(code, sentence)] if missing else ())))
+
+
 def reference_runs(study: Problem) -> Runs | None:
     """The published table in the order of our design; responses that it does not have are NaN, and a note names them.
 
@@ -167,12 +181,7 @@ def reference_runs(study: Problem) -> Runs | None:
     if study.file.reference is None:
         return None
     path = study.path_of(study.file.reference.file)
-    sheet = read_sheet(path)
-    shared = [name for name in study.figures if name in sheet]
-    table = read_runs(study.with_responses(shared or study.figures), path)
-    missing = [name for name in study.figures if name not in shared]
-    sentence = f"{path} has no column of {', '.join(missing)}, which {are(len(missing))} not compared"
-    notes = [Note("table", sentence)] if missing else []
+    shared, table = shared_runs(study, path, study.figures, "table", "not compared")
     rows = list(range(len(table.coded)))
     order = []
     for point in study.design.coded:
@@ -183,9 +192,9 @@ def reference_runs(study: Problem) -> Runs | None:
             )
         order.append(rows.pop(int(np.argmin(distance))))
     values, errors = np.full((2, len(order), len(study.responses)), np.nan)
-    columns = [study.responses.index(name) for name in shared]
+    columns = [study.responses.index(name) for name in shared.responses]
     values[:, columns], errors[:, columns] = table.values[order], table.errors[order]
-    return Runs(table.coded[order], table.actual[order], values, errors, (*table.notes, *notes))
+    return Runs(table.coded[order], table.actual[order], values, errors, table.notes)
 
 
 def compare_with_published(study: Problem, ours: Runs, theirs: Runs) -> dict[str, PublishedComparison]:

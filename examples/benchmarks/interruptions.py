@@ -78,7 +78,7 @@ def inputs(folder: Path) -> None:
     (folder / "uncertain.toml").write_text(scene, "utf-8")
     (folder / "rig_scene.toml").write_text(scene + "[calibrate]\nwaves = 1\n", "utf-8")
     (folder / "rig.csv").write_text(RIG, "utf-8")
-    study = (EXAMPLES / "clearance_study.toml").read_text("utf-8").replace("replicates = 16", "replicates = 2")
+    study = (EXAMPLES / "clearance_study.toml").read_text("utf-8").replace("replicates = 16", "replicates = 6")
     study = re.sub(r"(?m)^set = .*numerics\.turns=40.*$", f"set = {json.dumps(SHORT)}", study)
     study = study.replace("generations = 200", "generations = 20")
     (folder / "duty_study.toml").write_text(study + DUTY, "utf-8")

@@ -73,6 +73,7 @@ CODES: dict[str, Code] = {
     "few-replicates": Code(NOTE, "so few replicates that only large differences are significant"),
     "tolerances": Code(WARNING, "no tolerances, or too fine ones, satisfy the requirements of the study"),
     "region": Code(WARNING, "the region of the study moved to where its clearances in operation stay above their floors"),
+    "missing-column": Code(WARNING, "a table of runs has no column of a response of its study, which is left out"),
     "lost-runs": Code(WARNING, "runs or input sets failed and are left out"),
     "cage-class": Code(WARNING, "front and pick of a study stay away from runs whose cage misses its limit"),
     "inputs": Code(WARNING, "the ranges of unknown inputs are doubtful, or keys of the study override it"),

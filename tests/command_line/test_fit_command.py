@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from short_studies import paper_study, with_paper_goals
 from typer.testing import CliRunner, Result
 
 from doe.cli import app
@@ -37,7 +38,7 @@ def run(folder: Path, table: pd.DataFrame | str, *options: str, replace: tuple[s
 
 def study(folder: Path, replace: tuple[str, str] = ("", "")) -> Path:
     """The example study with linear models, which are quick, in a folder of its own."""
-    text = (EXAMPLES / "clearance_study.toml").read_text(encoding="utf-8").replace('"quadratic"', '"linear"')
+    text = with_paper_goals((EXAMPLES / "clearance_study.toml").read_text("utf-8")).replace('"quadratic"', '"linear"')
     path = folder / "study.toml"
     path.write_text(text.replace(*replace) if replace[0] else text, encoding="utf-8")
     return path
@@ -123,14 +124,14 @@ HEADER = ",".join(TABLE.columns)
     ("table", "replace", "words"),
     [
         (
-            TABLE.drop(columns="power_loss_W"),
+            TABLE.drop(columns="guide_clearance_mm"),
             ("", ""),
-            "column 'power_loss_W' is missing; add it, or rename the factor",
+            "column 'guide_clearance_mm' is missing; add it, or rename the factor",
         ),
         (
-            TABLE.drop(columns="power_loss_W"),
+            TABLE.drop(columns=RESPONSES),
             ("", ""),
-            "to one of run, radial_clearance_mm, guide_clearance_mm, pocket",
+            "column 'power_loss_W' is missing; add it, or rename the factor or response",
         ),
         (TABLE.head(4), ("", ""), "4 runs are too few for the linear model; give at least 5"),
         (TABLE.assign(guide_clearance_mm=0.15), ("", ""), "cannot separate B from the other terms"),
@@ -159,10 +160,24 @@ def test_bad_input_is_a_sentence_and_exit_2(tmp_path, table, replace, words):
     assert not (tmp_path / "out").exists()
 
 
+def test_responses_without_a_column_are_left_out_with_a_note():
+    """Command line: the example study names a response that its published table lacks; the others are fitted as without it."""
+    study, table = str(EXAMPLES / "clearance_study.toml"), str(EXAMPLES / "ccd_table4.csv")
+    record = json.loads(CliRunner().invoke(app, ["fit", study, "--data", table, "--json"]).stdout)
+    (note,) = record["notes"]
+    assert (
+        note["text"] == f"{table} has no column of pocket_impact_power_W, which is left out"
+        and note["level"] == "warning"
+    )
+    paper = paper_study()
+    surfaces = fit_surfaces(paper, read_runs(paper, Path(table)))
+    assert {name: fit["r2"] for name, fit in record["responses"].items()} == {fit.name: fit.r2 for fit in surfaces}
+
+
 def test_all_faults_of_a_table_at_once(tmp_path):
     table = TABLE.drop(columns="power_loss_W").assign(block="one", impact_force_N="many")
     faults = run(tmp_path, table).stderr.splitlines()
-    assert len(faults) == 41 and len(set(faults)) == 41
+    assert len(faults) == 40 and len(set(faults)) == 40
 
 
 def test_rows_of_one_run_are_its_replicates(tmp_path):

@@ -4,15 +4,19 @@ from __future__ import annotations
 
 import json
 import tomllib
+from dataclasses import replace
+from types import SimpleNamespace
 
 import pytest
 from doe_command import doe
 from short_studies import EXAMPLES
 
 from doe.clearance import responses_of
+from doe.commands.new import baseline_cages
 from doe.commands.new_parts import manufacture_of
 from doe.dimension_chain import chain_from, solve
 from doe.study_file.sections import StudyChain
+from doe.workflow.effort import Effort
 from doe.workflow.parts import clearance_parts
 from doe.workflow.problem import Problem
 from rbdyn.base.faults import InputError
@@ -20,6 +24,7 @@ from rbdyn.base.tables.sheet import listed
 from rbdyn.properties.tolerances import grade_tolerances
 from rbdyn.scene import Scene
 
+BASELINE_CAGES = baseline_cages
 SMALL = ("--rollers", "12", "--roller", "5x5", "--pitch", "30")
 INNER = ("--rollers", "18", "--roller", "13x22", "--pitch", "95", "--guidance", "inner", "--bore", "70")
 LARGE = ("--rollers", "5", "--roller", "30x30", "--pitch", "120", "--guidance", "roller")
@@ -191,3 +196,38 @@ def test_command_line_from_a_drawing_to_parts(scene, tmp_path):
     assert record["status"] == "ok" and set(record["limits"]) >= {"power_loss_W", "cage_slip"}
     parts = (tmp_path / "study" / "part_dimensions.csv").read_text(encoding="utf-8").splitlines()
     assert {line.split(",")[0] for line in parts[1:]} == {chain["name"] for chain in study["chain"]}
+
+
+@pytest.mark.parametrize(
+    ("classes", "goal", "words"),
+    [
+        ({"operation": "held"}, "pocket_impact_power_W", True),
+        ({"idle": "held", "cruise": "held"}, "pocket_impact_power_W", True),
+        ({"idle": "held", "cruise": "circling"}, "whirl_deviation_ratio", False),
+        ({"operation": "undecided"}, "whirl_deviation_ratio", False),
+        ({}, "whirl_deviation_ratio", False),
+    ],
+)
+def test_command_line_goals_follow_the_class_of_the_cage(scene, monkeypatch, classes, goal, words):
+    """Command line: impact power instead of the whirl ratio where the cage is held at every point, and a comment; a limit still names it."""
+    found = {point: SimpleNamespace(name=name) for point, name in classes.items()}
+    monkeypatch.setattr("doe.commands.new.baseline_cages", lambda *study: found)
+    text, study = written(scene)
+    goals = [response["name"] for response in study["response"] if response["goal"] == "min"]
+    assert goals == ["impact_force_N", goal, "power_loss_W"]
+    assert ("Cage: held in a short run" in text) == words == ("You can still name the whirl ratio" in text)
+    _, limited = written(scene, "--limit", "whirl_deviation_ratio<=0.7")
+    whirl = next(response for response in limited["response"] if response["name"] == "whirl_deviation_ratio")
+    assert whirl["upper"] == 0.7 and whirl["goal"] == ("none" if words else "min")
+
+
+def test_unit_class_of_the_cage_of_a_baseline(scene, tmp_path):
+    """Unit: a short run at the baseline traces the cage with as few replicates as name a class; none where nothing traces it."""
+    (tmp_path / "study.toml").write_text(written(scene)[0], encoding="utf-8")
+    study, heard = Problem.load(tmp_path / "study.toml"), list[str]()
+    (cage,) = BASELINE_CAGES(study, tmp_path, Effort(notice=lambda note: heard.append(str(note)))).values()
+    assert cage.name == "held" and cage.replicates == {"held": 6}
+    assert heard == ["1 short run of 300 shaft turns for the class of the cage"]
+    untraced = replace(study, file=study.file.model_copy(deep=True), built={})
+    untraced.scene.set.append("verdict.trace=false")
+    assert BASELINE_CAGES(untraced, tmp_path, Effort()) == {}

@@ -6,6 +6,7 @@ import re
 from pathlib import Path
 
 import numpy as np
+from short_studies import with_paper_goals
 
 from doe.workflow.problem import Problem
 from doe.workflow.runs import read_runs
@@ -38,7 +39,7 @@ def noisy_bowls(seed, noise, failing=False):
 
 def edited_study(folder, *replacements):
     """The example study with a small search, without tolerances but of the pocket, and replaced text; in ``folder``."""
-    text = (EXAMPLES / "clearance_study.toml").read_text(encoding="utf-8")
+    text = with_paper_goals((EXAMPLES / "clearance_study.toml").read_text(encoding="utf-8"))
     text = text.replace("population = 100", "population = 40").replace("generations = 200", "generations = 30")
     text = re.sub(r"^tolerance(_aware)? = .*\n", "", text, flags=re.MULTILINE)
     pocket = 'factor = "pocket_clearance_mm"\n'

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 import sqlite3
 from pathlib import Path
+
+from doe.study_file.sections import OtherLimits
+from doe.workflow.problem import Problem
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 # Searches that find something, and draws that tell something, in no time.
@@ -12,11 +16,25 @@ BRIEF = (("generations = 200", "generations = 5\ndraws = 100"), ("keep = 0.5", "
 SHORT = "turns=3,discard_turns=1,replicates=2,companion=false,impact_window_turns=1"
 
 
+def with_paper_goals(text: str) -> str:
+    """The text of the example study with the goals of its paper alone, for which short runs and the published table serve."""
+    added = re.compile(r'^\[\[response\]\]\nname = "pocket_impact_power_W".*?^(?=\[front\])', re.MULTILINE | re.DOTALL)
+    assert added.search(text) and "\n[limits]\n" in text
+    return added.sub("", text)
+
+
+def paper_study() -> Problem:
+    """The example study itself with the goals of its paper alone."""
+    study = Problem.load(EXAMPLES / "clearance_study.toml")
+    goals = [name for name in study.responses if name != "pocket_impact_power_W"]
+    return study.with_responses(goals).with_file(limits=OtherLimits())
+
+
 def short_study(folder: Path, settings: str = SHORT, replace: tuple[str, str] = ("", "")) -> Path:
     """The example study with a short simulation, in a folder of its own."""
     for name in ("cylindrical_roller.toml", "ccd_table4.csv", "bearing_chains.toml"):
         shutil.copy(EXAMPLES / name, folder)
-    text = (EXAMPLES / "clearance_study.toml").read_text(encoding="utf-8")
+    text = with_paper_goals((EXAMPLES / "clearance_study.toml").read_text(encoding="utf-8"))
     lines = [f'"numerics.{each}"' for each in settings.split(",")]
     first = next(line for line in text.splitlines() if line.startswith("set = "))
     text = text.replace(first, f"set = [{', '.join(lines)}]").replace("replicates = 16", "replicates = 2")

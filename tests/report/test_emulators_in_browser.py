@@ -9,14 +9,13 @@ from typing import Any
 import numpy as np
 import pytest
 from report_page import PICTURE, keys, opened, report_in_browser, text_of
-from short_studies import EXAMPLES
+from short_studies import paper_study
 from synthetic_study import CENTRE, FACTORS, RESPONSES, STEP, predicted, searched, summary
 
 from doe.adaptive.emulators import Emulators, Runs, fit_emulators
 from doe.pareto.search import Goals
 from doe.report.page import html_report
 from doe.report.summary import Summary
-from doe.workflow.problem import Problem
 from doe.workflow.search_record import Emulated
 
 
@@ -42,7 +41,7 @@ def with_emulators(record: dict[str, Any]) -> tuple[dict[str, Any], Emulators]:
     runs, shares = Runs(points, values, errors, whole, np.full(24, 8)), (0.42, 0.0, 0.28)
     emulators = fit_emulators(Goals.of(["min"] * 3), runs, None, shares)
     assert shares in emulators.shares and () in emulators.shares
-    study = Problem.load(EXAMPLES / "clearance_study.toml")
+    study = paper_study()
     found = SimpleNamespace(search=SimpleNamespace(emulators=emulators))
     region = {each["name"]: [each["low"], each["high"]] for each in record["asked"]["factors"]}
     region[FACTORS[2]][1] += 0.1

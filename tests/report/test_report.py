@@ -14,6 +14,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from short_studies import paper_study
 from synthetic_study import FACTORS, RESPONSES, VERDICT, motion, pocket_chain, summary
 
 from doe.report.files import response_surface
@@ -30,7 +31,6 @@ from doe.unknown.propagation import Share
 from doe.workflow.confirmation import Gain
 from doe.workflow.judgement import ConfirmedGain, Robust, RobustFront
 from doe.workflow.pick import BeyondBound, Outward
-from doe.workflow.problem import Problem
 from doe.workflow.runs import read_runs
 from doe.workflow.surfaces import fit_surfaces
 from rbdyn.base.words import label, quantity, rounded_down, shown, with_error
@@ -348,7 +348,7 @@ def test_pictures_keep_their_words_off_the_curves(monkeypatch, tmp_path):
     for axis in [*figure.axes, *kept["one"].axes]:
         boxes = [each.get_window_extent() for each in axis.get_xticklabels() if each.get_text()]
         assert not any(one.overlaps(two.padded(18.0)) for one, two in pairwise(boxes))
-    study = Problem.load(EXAMPLES / "clearance_study.toml")
+    study = paper_study()
     response_surface(study, fit_surfaces(study, read_runs(study, EXAMPLES / "ccd_table4.csv"))[0], "surface")
     for axis, held in zip(kept["surface"].axes, ("pocket clearance 0.3 mm", "guide clearance 0.15 mm"), strict=True):
         assert axis.get_zlabel() == "impact force [N]" and held in axis.get_title()

@@ -11,7 +11,7 @@ import pytest
 from coarse_search import coarsely
 from instant_runs import instantly
 from scipy.stats import qmc
-from short_studies import EXAMPLES, SHORT, run_study, short_study, silent
+from short_studies import SHORT, paper_study, run_study, short_study, silent
 
 from doe import clearance
 from doe.adaptive.emulators import Region
@@ -127,7 +127,7 @@ def test_sentences_say_pick_end_hold_trust_and_hypervolumes(studied):
 
 def foretelling(predict, faces=()):
     """The example with a search that foretells responses so over coded factors, its pick foretold at faces of the region."""
-    study = Problem.load(EXAMPLES / "clearance_study.toml")
+    study = paper_study()
     one = np.ones(3)
     goals = study.goals
     corners = np.random.default_rng(1).uniform(-1.0, 1.0, (64, 3))

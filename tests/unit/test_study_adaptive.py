@@ -10,7 +10,7 @@ import pytest
 from coarse_search import coarsely
 from doe_command import doe
 from instant_runs import instantly, unillustrated
-from short_studies import SHORT, run_design, run_study, short_study, silent
+from short_studies import SHORT, paper_study, run_design, run_study, short_study, silent
 
 from doe import clearance
 from doe.clearance import Simulations
@@ -146,9 +146,7 @@ def test_runs_that_fail_are_told_and_left_out(tmp_path, monkeypatch):
 
 
 def test_points_are_on_the_drawing_and_inside():
-    from pareto_cases import EXAMPLES
-
-    study = Problem.load(EXAMPLES / "clearance_study.toml")
+    study = paper_study()
     region = region_in_units(study)
     points = region.snap(np.random.default_rng(1).uniform(-1.1, 1.1, (200, 3)))
     assert np.abs(points).max() <= 1.0
@@ -260,7 +258,7 @@ def test_faults_are_one_sentence_each(tmp_path, monkeypatch):
 def test_advice_where_surfaces_miss_more_than_noise():
     from pareto_cases import EXAMPLES
 
-    study = Problem.load(EXAMPLES / "clearance_study.toml")
+    study = paper_study()
     from doe.workflow.runs import read_runs
 
     runs = read_runs(study, EXAMPLES / "ccd_table4.csv")

@@ -20,9 +20,9 @@ from doe_command import doe
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from scipy.special import stdtrit
+from short_studies import paper_study
 
 from doe.study_file.table import RUN, read_table
-from doe.workflow.problem import Problem
 from doe.workflow.runs import read_runs
 from doe.workflow.surfaces import drawn_responses, fit_surfaces, residual_correlation
 from rbdyn.base.faults import InputError
@@ -238,7 +238,7 @@ def damaged(draw: random.Random, data: bytes) -> bytes:
 
 def test_draws_of_surfaces_on_different_rows_pair_the_errors_of_common_runs(tmp_path):
     """With all rows the draws are those of before; a gap changes its own response, and correlations use common rows."""
-    study = Problem.load(STUDY)
+    study = paper_study()
     table = pd.read_csv(TABLE)
     table.to_csv(tmp_path / "whole.csv", index=False)
     table.loc[4, "power_loss_W"] = None

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from conftest import ROOT
+from short_studies import paper_study
 from threadpoolctl import threadpool_limits
 
 from doe.emulator import fit_emulator
 from doe.response_surface.statistics import fits_of
 from doe.unknown.posterior import sampled
 from doe.unknown.propagation import Runs, emulated, range_of, sobol
-from doe.workflow.problem import Problem
 from doe.workflow.runs import read_runs
 from doe.workflow.surfaces import fit_surfaces, with_rivals
 from rbdyn.base.arrays import _controller, one_thread
@@ -90,7 +90,7 @@ def test_unit_threads_are_given_back():
 
 def test_invariant_a_fit_has_the_same_bits_on_any_number_of_threads():
     """Invariant: surfaces, their analysis of variance and their rivals."""
-    study = Problem.load(ROOT / "examples" / "clearance_study.toml")
+    study = paper_study()
     runs = read_runs(study, ROOT / "examples" / "ccd_table4.csv")
     one, *others = with_threads(lambda: repr(fits_of(with_rivals(fit_surfaces(study, runs))).as_dict()))
     assert all(other == one for other in others)
