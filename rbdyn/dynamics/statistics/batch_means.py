@@ -18,6 +18,7 @@ from short series is itself uncertain: with it, intervals of the impact of the b
 
 import math
 from collections.abc import Callable, Sequence
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -100,6 +101,7 @@ def student_half_width(values: Array) -> float | None:
     return float(student_factor(count - 1) * values.std(ddof=1) / math.sqrt(count))
 
 
+@cache
 def student_factor(freedom: int, level: float = 0.95) -> float:
     """The t for which the share ``level`` of Student's distribution with ``freedom`` > 0 degrees lies between -t and t.
 
