@@ -259,7 +259,7 @@ class FrontAnswer(Answer):
     def brief(self) -> str:
         gains = self.result.predicted_gains.items()
         texts = [f"{quantity(name)[0]} {with_error(gain.percent, gain.error_percent)} %" for name, gain in gains]
-        return f"{counted(len(self.result.front), 'point')}; predicted gains of the pick {', '.join(texts)}"
+        return f"{counted(len(self.result.front), 'point')}; predicted gains of the selected design {', '.join(texts)}"
 
 
 def front(

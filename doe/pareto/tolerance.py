@@ -109,7 +109,7 @@ def widest_tolerances(
     if (share <= 0.0).any() or not 0.0 < probability < 1.0:
         raise MethodError(f"ratios = {share.tolist()}, probability = {probability}: must be positive and in (0, 1)")
     if (room < -1e-9 * (high - low)).any():
-        raise MethodError(f"pick = {centre.tolist()}: is outside the region; pick a point within it")
+        raise MethodError(f"pick = {centre.tolist()}: is outside the region; choose a point within it")
     offsets = random_offsets(samples, centre.size, distribution, seed)
     texts = promise, open_errors
     limit = np.asarray(limits, float)
@@ -118,7 +118,7 @@ def widest_tolerances(
     if parts.share(exact) < probability:
         worst = parts.most_broken(exact)
         return parts.nothing(
-            worst, f"even the exact pick keeps {worst} with a probability below the required {parts.percent}"
+            worst, f"even the exact selected design keeps {worst} with a probability below the required {parts.percent}"
         )
     return _result(parts, parts.largest_scale(share), share)
 

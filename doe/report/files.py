@@ -253,7 +253,7 @@ def confirmation_sheet(
         "gain on the baseline, positive where better, and its half width",
     )
     columns: tuple[Column[Row], ...] = (
-        Column("point", meaning="baseline, pick, or the rule that chose the point"),
+        Column("point", meaning="baseline, pick (the selected design), or the rule that chose the point"),
         *Column[Row]("{}", unit="of the name", meaning="the point").of(factors),
         Column("response", meaning="the response of this row"),
         *Column[Row]("{}", unit="of the response", meaning=mean).of(["value", "statistical_error", "numerical_error"]),

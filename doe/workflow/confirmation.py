@@ -44,7 +44,9 @@ ORDER: tuple[Verdict, ...] = ("kept", "undecided", "broken")
 
 def point_words(name: str) -> str:
     """The name of a confirmed point as people read it."""
-    return "pick without tolerances" if name == "without_tolerances" else name.replace("_", " ")
+    return {"pick": "selected design", "without_tolerances": "pick without tolerances"}.get(
+        name, name.replace("_", " ")
+    )
 
 
 @dataclass(frozen=True)
@@ -168,7 +170,7 @@ def confirm(
         if not isinstance(result, Failure):
             confirmed[name] = confirmed_from(study, choice, result)
         elif name == "pick":
-            raise LostPickError(f"confirmation of the {result}")
+            raise LostPickError(f"confirmation of the {point_words(name)}{str(result).removeprefix(name)}")
         else:
             failures.append(result)
     return confirmed, failures
@@ -203,7 +205,7 @@ def worse_notes(gains: Mapping[str, Gain]) -> Notes:
         for name, gain in gains.items()
         if gain.verdict == "worse"
     ]
-    return (Note("worse", f"the pick is worse than the baseline: {', '.join(worse)}"),) if worse else ()
+    return (Note("worse", f"the selected design is worse than the baseline: {', '.join(worse)}"),) if worse else ()
 
 
 def whirl_sentence(study: Problem, confirmed: Mapping[str, Confirmed]) -> str:
@@ -214,7 +216,7 @@ def whirl_sentence(study: Problem, confirmed: Mapping[str, Confirmed]) -> str:
         result = confirmed[name].result
         if result is not None and result.jitters and result.cage_orbit_radius_share is not None:
             points = ", ".join(result.jitter_points) if isinstance(result, DutyResult) else ""
-            where = f"at the {name}{f' ({points})' if points else ''}"
+            where = f"at the {point_words(name)}{f' ({points})' if points else ''}"
             radii.append(f"{result.cage_orbit_radius_share.value:.2g} of its clearance {where}")
     if WHIRL not in objectives or not radii:
         return ""

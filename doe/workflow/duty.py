@@ -115,7 +115,7 @@ def duty_answer(study: Problem, runs: Runs, confirmed: Mapping[str, Confirmed]) 
         try:
             own = own_pick(here, runs.at_points[name], pick.point)
         except InputError as error:
-            note = f"{name} alone has no pick: {'; '.join(error.faults)}"
+            note = f"{name} alone has no selected design: {'; '.join(error.faults)}"
         before, after = (
             {figure: SimulatedValue.of(quantity) for figure, quantity in end.at_points[name].items()}
             for end in (baseline, pick)

@@ -125,7 +125,7 @@ def worded(robust: Robust, decision: Decision, notes: Notes = ()) -> Robust:
     undecided = _undecided(robust, decision) if decision.verdict == "undecided" else None
     sure = [decider for decider in decision.inputs if decider.worth > LEAST and decision.verdict == "decided"]
     sentences = [
-        f"Probability that the pick is better: {chances}; in all of these {every.of_hundred} %. The gains {statement} the unknown inputs "
+        f"Probability that the selected design is better: {chances}; in all of these {every.of_hundred} %. The gains {statement} the unknown inputs "
         f"({counted(len(robust.inputs), 'input')}, {robust.pairs} input sets, both designs at each).",
         f"{undecided or (_decided(decision) if decision.verdict == 'decided' else _nothing(robust, decision))}{_together(robust.pair)}",
         *_of_front(robust),
@@ -145,13 +145,13 @@ def _of_front(robust: Robust) -> list[str]:
     doubt = f"; the emulators predict little of {' and '.join(lost)}, so a better one may exist" if lost else ""
     if best.chances.all.value <= pick.chances.all.value:
         return [
-            f"No simulated point of the robust front is better in all responses in more cases than the pick{doubt}."
+            f"No simulated point of the robust front is better in all responses in more cases than the selected design{doubt}."
         ]
     place = ", ".join(
         f"{quantity(name)[0]} {shown(x)} {quantity(name)[1]}".rstrip() for name, x in best.factors.items()
     )
     return [
-        f"Safer alternative: {place} (better in all responses in {best.chances.all.of_hundred} % of the cases; the pick at the "
+        f"Safer alternative: {place} (better in all responses in {best.chances.all.of_hundred} % of the cases; the selected design at the "
         f"same input sets in {pick.chances.all.of_hundred} %){doubt}."
     ]
 

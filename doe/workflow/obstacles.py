@@ -216,7 +216,7 @@ def _cage_sentence(study: Problem, pick: Confirmed) -> str:
     where = {name: f" at {name}" if study.duty else "" for name in open_points}
     words = "; ".join(f"{found.words.removeprefix('Cage: ')}{where[name]}" for name, found in open_points.items())
     return (
-        f"Limit cage.verdict = {study.file.limits.cage.verdict}: the class of the pick's cage is {words}. No surface predicts a class: change "
+        f"Limit cage.verdict = {study.file.limits.cage.verdict}: the class of the selected design's cage is {words}. No surface predicts a class: change "
         "the bearing, its load or its speed, or state other classes."
     )
 
@@ -419,7 +419,7 @@ def better_points(study: Problem, confirmed: Mapping[str, Confirmed]) -> list[st
 def rivals_sentences(forecast: Forecast, confirmed: Mapping[str, Confirmed]) -> list[str]:
     """For each point that is better than the pick in every response as simulated: why it is not the pick, in one sentence."""
     return [
-        f"Point {point_words(name)} is better than the pick in every response as simulated"
+        f"Point {point_words(name)} is better than the selected design in every response as simulated"
         f"{_uncertain(forecast.study, confirmed[name], confirmed['pick'])}, {_reason(forecast, confirmed[name], confirmed['pick'])}."
         for name in better_points(forecast.study, confirmed)
     ]
@@ -445,15 +445,13 @@ def _reason(forecast: Forecast, rival: Confirmed, pick: Confirmed) -> str:
         )
     here, there = forecast.at(rival.point), forecast.at(pick.point)
     if here is None and forecast.searched is not None:
-        return f"but it is not a point of the {forecast.searched.name} front, from which the pick is chosen"
+        return f"but it is not a point of the {forecast.searched.name} front, from which the design is selected"
     where = " at the ends of its tolerances" if forecast.with_tolerances else ""
     if here is not None and there is not None:
         if there.keeps and not here.keeps:
             return f"but {forecast.source} a broken limit{where}"
         if (worse := here.costs > there.costs).any():
-            return (
-                f"but{where} {forecast.source} {_losses(study, here.costs, there.costs, worse, pick)} than at the pick"
-            )
+            return f"but{where} {forecast.source} {_losses(study, here.costs, there.costs, worse, pick)} than at the selected design"
     return "and nothing that the study knows speaks against it: consider it"
 
 

@@ -110,7 +110,7 @@ def _share_words(shares: Array, row: int) -> str:
     """How often this point is the pick under the errors of its simulation, and the most frequent other one."""
     others = np.delete(shares, row)
     rival = f", another in {100.0 * others.max():.0f}" if others.size and others.max() > 0.0 else ""
-    return f"; it is the pick in {100.0 * shares[row]:.0f} of 100 draws of the simulation's errors{rival}"
+    return f"; the same point is selected in {100.0 * shares[row]:.0f} of 100 draws of the simulation's errors{rival}"
 
 
 def neighbourhood(study: Problem, searched: Adaptive, coded: Array, values: Array) -> Neighbourhood:
@@ -229,7 +229,7 @@ def choose(
     points = choices(study, front, searched, candidate)
     for number, (point, _, _) in enumerate(trials, 1):
         if point is not pick:
-            points[f"try_{number}"] = Choice(point.point, f"try {number} for the pick: {point.reason}")
+            points[f"try_{number}"] = Choice(point.point, f"try {number} for the selected design: {point.reason}")
     points["pick"] = Choice(pick.point, pick.reason)
     confirmed, failures = confirm(study, baseline, points, simulations)
     return Selection(front, candidate, confirmed, failures, len(trials))
@@ -296,9 +296,9 @@ def _candidates(
         yield name, point, aware.pick_reason
         yield "without_tolerances", front.points[front.pick], front.pick_reason
     for rule, row in () if front.violations is not None else front.picks.items():
-        yield rule, front.points[row], f"the pick by {rule}"
+        yield rule, front.points[row], f"selected by {rule}"
     if searched is not None:
-        yield searched.name, searched.front.points[searched.front.pick], f"the pick of the {searched.name} front"
+        yield (searched.name, searched.front.points[searched.front.pick], f"selected from the {searched.name} front")
 
 
 NEAR = 0.04  # share of a factor's range within which a point lies at a bound
@@ -327,7 +327,7 @@ class Place(NamedTuple):
             return f"{point} lies at {ends}, and farther out than any run: the surfaces extrapolate there."
         if ends:
             return f"{point} lies at {ends}."
-        return f"{point} lies farther out than any run: the surfaces extrapolate there." if self.beyond else ""
+        return f"{point} is farther out than any run: the surfaces extrapolate there." if self.beyond else ""
 
 
 class BeyondBound(Record):
@@ -358,7 +358,7 @@ class Outward(Record):
         )
         position = f"{self.bound:.4g} {quantity(factor)[1]}".rstrip()
         return (
-            f"The pick is at the {self.side} bound of {factor}, {position}. "
+            f"The selected design is at the {self.side} bound of {factor}, {position}. "
             f"Extrapolated change per {self.per} beyond it by {self.source}: {changes}."
         )
 
@@ -384,13 +384,13 @@ def _edge_sentence(outward: Sequence[str], beyond_runs: bool, front_share: float
         searched = f"{100.0 * searched_share:.0f} % of the simulator's own front"
         shares = f"{100.0 * front_share:.0f} % of the front on the surfaces and {searched} lie {near}"
     if outward:
-        beyond = " The pick lies farther out than any run: the surfaces extrapolate there." if beyond_runs else ""
+        beyond = (
+            " The selected design is farther out than any run: the surfaces extrapolate there." if beyond_runs else ""
+        )
         return f"{' '.join(outward)}{beyond} {shares}; a wider design may find more."
     if beyond_runs:
-        return (
-            f"The pick lies between the bounds, but farther out than any run: the surfaces extrapolate there; {shares}."
-        )
-    return f"The pick lies inside the region; {shares}."
+        return f"The selected design lies between the bounds, but farther out than any run: the surfaces extrapolate there; {shares}."
+    return f"The selected design lies inside the region; {shares}."
 
 
 def share_at_edge(study: Problem, points: Array) -> float:

@@ -164,7 +164,7 @@ def find_robust_front(
     except InfeasibleError:
         note = "no point keeps the limits over the unknown inputs"
         return RobustFront([], [], q2, note), spent, sets.failures
-    candidates = {"pick": (pick, "the pick"), **_choices(study, robust_front, emulators)}
+    candidates = {"pick": (pick, "the selected design"), **_choices(study, robust_front, emulators)}
     designs = {"baseline": study.assignments(study.baseline)}
     designs |= {name: study.assignments(point) for name, (point, _) in candidates.items()}
     rows = fresh_rows(settings.points)
@@ -297,7 +297,7 @@ def _choices(study: Problem, pareto: ParetoFront, emulators: _GainEmulators) -> 
     for name, row in rows.items():
         point = study.rounded_within(pareto.points[row])
         if len(candidates) < POINTS and not any(np.array_equal(point, other) for other, _ in candidates.values()):
-            candidates[f"robust {name}"] = point, reasons.get(name, f"the pick of the robust front by {name}")
+            candidates[f"robust {name}"] = (point, reasons.get(name, f"selected from the robust front by {name}"))
     return candidates
 
 

@@ -98,13 +98,13 @@ def run_design(study: Problem, simulations: clearance.Simulations, progress: Pro
             f" {counted(added, 'other run')} in the rest of the region {are(added)} in their place." if added else ""
         )
         left_out = f"{counted(len(failures), 'design run')} failed and {are(len(failures))} left out: {sentence(failures).rstrip('.')}."
-        notes.insert(0, Note("lost-runs", f"{left_out}{instead} Front and pick stay where the nearest run went well."))
+        notes.insert(
+            0, Note("lost-runs", f"{left_out}{instead} Front and selected design stay near runs that went well.")
+        )
     missed = _cages_missed(study, sound)
     if missed is not None:
         runs_words = f"{counted(int(missed.sum()), 'design run')} of {len(sound)} {are(int(missed.sum()))} outside"
-        sentence_words = (
-            f"{runs_words} limits.cage.verdict. Front and pick stay where the cage of the nearest run keeps it."
-        )
+        sentence_words = f"{runs_words} limits.cage.verdict. Front and selected design stay where the cage of the nearest run keeps it."
         notes.insert(0, Note("cage-class", sentence_words))
     values, errors, independent = clearance.figures(study.responses, sound)
     block = np.array(design.block_numbers)[rows] if design.blocks > 1 else None

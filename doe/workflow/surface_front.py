@@ -246,7 +246,7 @@ class SurfaceFront(Record, kw_only=True):
                 gain.response: replace(gain, selection_optimism_percent=100.0 * excess / abs(gain.baseline))
                 for gain, excess in zip(gains, sure.optimism.tolist(), strict=True)
             },
-            statement=f"{statement(gains)} {place.sentence('The pick' if aware is None else f'The {WITHOUT}')}".rstrip(),
+            statement=f"{statement(gains)} {place.sentence('The selected design' if aware is None else f'The {WITHOUT}')}".rstrip(),
             constraints=surface_limits(study, front.points[front.pick]),
             archive=front.archive_size,
             feasible_share=front.feasible,

@@ -256,7 +256,7 @@ def extrapolation_notes(surfaces: Sequence[Surface], coded: Array) -> Notes:
     if not beyond:
         return ()
     names = ", ".join(quantity(name)[0] for name in beyond)
-    sentence = f"extrapolation: at the pick the surfaces of {names} are less sure than at any run; simulate it, or add runs there"
+    sentence = f"extrapolation: at the selected design the surfaces of {names} are less sure than at any run; simulate it, or add runs there"
     return (Note("extrapolation", sentence),)
 
 

@@ -315,7 +315,7 @@ def widest_tolerances_of(
 
 def _none(widest: WidestTolerances) -> WidestTolerances:
     """No tolerances, for a pick without a gain or a limit to keep."""
-    sentence = "No tolerances follow, for the pick has no gain to keep and no response has a limit."
+    sentence = "No tolerances follow, because the selected design has no gain to keep and no response has a limit."
     return replace(widest, half_widths=np.full_like(widest.half_widths, np.nan), limited_by="", sentence=sentence)
 
 
@@ -323,7 +323,7 @@ def _impossible(demands: Sequence[Demand]) -> str:
     """The first gain that the pick itself does not have, in a sentence; empty if it has them all."""
     for demand in demands:
         if demand.least is not None and demand.percent <= 0.0:
-            return f"No tolerance is possible: the pick has no gain in {demand.words} to keep; leave it out of [tolerances]."
+            return f"No tolerance is possible: the selected design has no gain in {demand.words} to keep; leave it out of [tolerances]."
         if demand.least is not None and demand.least > demand.percent:
             return (
                 f"No tolerance is possible: at_least.{demand.response} = {demand.least:g} exceeds the predicted gain of "

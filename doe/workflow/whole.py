@@ -32,6 +32,7 @@ from doe.workflow.confirmation import (
     Verdict,
     gains,
     limits_of,
+    point_words,
     simulate_original,
     verdict_of,
     whirl_sentence,
@@ -112,7 +113,7 @@ def class_sentence(bore: float, drawn_um: float, kind: str) -> str:
         classes = classes_at(bore, drawn_um, kind)
     except MethodError:
         return ""
-    clearance_words = f"ISO 5753-1 at a bore of {bore:g} mm: the pick's radial clearance of {drawn_um:.3g} um"
+    clearance_words = f"ISO 5753-1 at a bore of {bore:g} mm: the selected radial clearance of {drawn_um:.3g} um"
     if not classes:
         return f"{clearance_words} falls in no class."
     first, *others = (f"{iso_class.name} ({iso_class.lower:g} to {iso_class.upper:g} um)" for iso_class in classes)
@@ -341,7 +342,11 @@ class StudyResult:
     def every_note(self) -> Notes:
         """The dangers of the pick first, then those of its runs and of the baseline's, then all other notes."""
         pick = (*self.obstacles.notes, *worse_notes(self.gains["pick"]))
-        runs = (note.about(f"at the {name}") for name in ("pick", "baseline") for note in self.confirmed[name].dangers)
+        runs = (
+            note.about(f"at the {point_words(name)}")
+            for name in ("pick", "baseline")
+            for note in self.confirmed[name].dangers
+        )
         duty, points = self.duty, self.study.file.duty
         hours = math.inf if duty is None else duty.life["pick"].L10_h or math.inf
         life = () if duty is None else life_notes(hours, sum(point.share for point in points))

@@ -232,7 +232,7 @@ class _Result:
 
 
 class _Simulations:
-    """Responses in closed form: the pick gains 2 % in impact and loss, in whirl only below an imbalance of 20 um."""
+    """Responses in closed form: the selected design gains 2 % in impact and loss, in whirl only below an imbalance of 20 um."""
 
     def __init__(self, error: float) -> None:
         self.error, self.replicates = error, list[int]()
@@ -336,7 +336,7 @@ def test_what_is_undecided_or_worth_nothing_is_said_so(judgement: tuple[Problem,
 
 
 def test_closed_form_of_the_odds_of_limits(judgement: tuple[Problem, Any]) -> None:
-    """Closed form: the impact of the pick is 78.4 N times the mass over 45 g, uniform from 40 to 50 g; both its limits count."""
+    """Closed form: the impact of the selected design is 78.4 N times the mass over 45 g, uniform from 40 to 50 g; both its limits count."""
     _, found = judgement
     low, high = (45.0 * each / 78.4 for each in (72.0, 80.0))
     assert set(found.odds) == {"impact_force_N", "power_loss_W"}
@@ -363,7 +363,7 @@ inputs = 2
 
 
 class _Rest(_Simulations):
-    """The pick gains in whirl only with a short pocket and little oil: of these at most one is in an emulator."""
+    """The selected design gains in whirl only with a short pocket and little oil: of these at most one is in an emulator."""
 
     def _one(self, scene: Scene) -> _Result:
         picked = scene.cage.pocket_clearance_mm < 0.3
@@ -519,7 +519,7 @@ def test_robust_front_keeps_what_it_promises(tmp_path: Path, kind: str) -> None:
     assert np.ptp(guide) > 0.05
     pick, surest, *_ = found.confirmed
     assert (pick.name, surest.name) == ("pick", "robust surest")
-    # The pick's guide costs more whirl than its pocket gains where the imbalance is above 12.5 um.
+    # The selected design's guide costs more whirl than its pocket gains where the imbalance is above 12.5 um.
     assert pick.chances.all.value == pytest.approx(0.25, abs=0.05) and surest.chances.all.value > 0.98
     for each in found.confirmed:
         _, guide_mm, pocket_mm = each.factors.values()

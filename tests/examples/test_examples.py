@@ -142,7 +142,7 @@ def test_invariant_the_flight_runs_on_simulations_that_take_no_time(tmp_path, mo
 
 @pytest.mark.slow
 def test_trend_the_flight_is_better_at_every_point(tmp_path):
-    """Trend: the pick hits the cage less and loses less at idle, cruise and take-off alike; cruise is the worst point for the cage."""
+    """Trend: the selected design hits the cage less and loses less at idle, cruise and take-off alike; cruise is the worst point for the cage."""
     import doe
 
     answer = doe.study(EXAMPLES / "duty_study.toml", tmp_path)

@@ -132,7 +132,7 @@ def summary() -> dict[str, Any]:
         "obstacles": NOTHING_MISSED,
         "tried": 1,
         "edge": {"beyond_runs": False, "factors": {}, "front_share": 0.1, "direct_front_share": None,
-                 "sentence": "The pick lies inside the region; 10 % of the front lies within 4 % of a bound of the region."},
+                 "sentence": "The selected design lies inside the region; 10 % of the front lies within 4 % of a bound of the region."},
         "asked": {
             "study_file": "study.toml",
             "scene_file": "scene.toml",
@@ -258,8 +258,8 @@ def searched(emulators: dict[str, Any] | None = None) -> dict[str, Any]:
         "failed": 0, "seed": 1, "seconds": 3.0, "emulator_seconds": 1.0,
         "compared": {"ideal": {}, "nadir": {}, "search": [volume for _, volume, _ in batches], "surfaces": 0.7,
                      "fresh": {"hypervolume": 0.88, "error": 0.02}},
-        "held": "What limits the pick: nothing.",
-        "sentences": ["The pick has a clearance of 0.0225 mm.", "80 runs and 20 fresh ones."],
+        "held": "What limits the selected design: nothing.",
+        "sentences": ["The selected design has a clearance of 0.0225 mm.", "80 runs and 20 fresh ones."],
     }  # fmt: skip
 
 

@@ -16,7 +16,7 @@ SOURCES = [path for package in ("rbdyn", "doe") for path in (ROOT / package).rgl
 LONGEST_FILE, LONGEST_FUNCTION, MOST_AT_THE_ROOT = 600, 70, 6
 # Lines of code of both packages. A change may lower this freely. Raise it only with the feature that needs it, and say by
 # how much in the commit.
-MOST_CODE = 49_560
+MOST_CODE = 49_531
 TOP = {
     ".ci",
     ".gitignore",
@@ -205,7 +205,7 @@ BANNED = {
     r"mend(?:s|ed|ing)?": "fix",
     r"what is not known|what nobody told": "unknown inputs",
     r"beside": "next to, compared with",
-    r"(?:holds?|held)(?: it| them| the pick)? back": "limits, limited by",
+    r"(?:holds?|held)(?: it| them| the selected design)? back": "limits, limited by",
     r"what manufacture makes of|what its tolerances leave": "at the ends of its tolerances",
     r"so or similarly": "in N of M runs",
     r"gains? with (?:less|more)": "improves as ... decreases",
@@ -260,7 +260,10 @@ def _texts(path: Path) -> list[tuple[int, str]]:
 
 def test_invariant_words_are_those_of_the_field():
     """Invariant: no message, docstring or page has a word that the glossary replaces; public keys and names are exempt."""
-    assert all(WORDS.search(each) for each in ("the pick foretold", "Mend it", "so or similarly 8 runs", "held back"))
+    assert all(
+        WORDS.search(each)
+        for each in ("the selected design foretold", "Mend it", "so or similarly 8 runs", "held back")
+    )
     read, found = 0, []
     for path in [*SOURCES, *PAGES, ROOT / "README.md"]:
         for line, text in _texts(path):

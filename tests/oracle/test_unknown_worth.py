@@ -21,7 +21,7 @@ def fewer_halves(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.usefixtures("fewer_halves")
 def test_the_input_that_decides_and_where_it_flips() -> None:
-    """The pick wins below 0.4 of the second input: probability 0.4, worth 0.4, flip there; a third input does nothing."""
+    """The selected design wins below 0.4 of the second input: probability 0.4, worth 0.4, flip there; a third input does nothing."""
     quantiles, fresh = nested(4, 256, 5), nested(4, 8192, 6)
     truth = np.column_stack([0.4 - quantiles[:, 1], np.full(256, 1.0) + 0.2 * quantiles[:, 0]])
     noisy_gains = noisy(truth, 0.05, 5)

@@ -26,7 +26,7 @@ def quantity(value: float) -> dict:
 
 
 def point(name: str, share: float, power: float) -> dict:
-    """A point of the duty where the pick takes 10 W less."""
+    """A point of the duty where the selected design takes 10 W less."""
     return {
         "name": name,
         "share": share,
@@ -97,11 +97,11 @@ def test_each_point_has_its_verdicts():
 
 
 def test_worst_points_have_their_probability():
-    """Unit: the pick's worst point of each such response is named with its probability, and the baseline's."""
+    """Unit: the selected design's worst point of each such response is named with its probability, and the baseline's."""
     (worst,) = (text for text in sentences(over_duty()) if text.startswith("Worst point"))
     assert worst == (
-        "Worst point of impact force at the pick: take-off (probability 0.980). Worst point of whirl deviation ratio at the "
-        "pick: cruise (probability 0.625), at the baseline idle (probability 0.750)."
+        "Worst point of impact force at the selected design: take-off (probability 0.980). Worst point of whirl deviation ratio at the "
+        "selected design: cruise (probability 0.625), at the baseline idle (probability 0.750)."
     )
     record = over_duty()
     record["duty"]["worst"]["pick"][WHIRL]["point"] = "idle"
@@ -116,7 +116,7 @@ def test_the_dearest_compromise_is_named_where_it_exceeds_its_errors():
     record["duty"]["points"][2]["own"]["gains_over_pick"][IMPACT] = {**COST, "percent": 15.0}
     (text,) = (text for text in sentences(record) if text.startswith("The compromise"))
     assert text == (
-        "The compromise costs most at take-off: a pick for that point alone has impact force 15.00 ± 0.65 % less on its surfaces."
+        "The compromise costs most at take-off: a design for that point alone has impact force 15.00 ± 0.65 % less on its surfaces."
     )
     for entry in record["duty"]["points"]:
         entry |= {"own": None, "own_note": f"{entry['name']} alone has no pick"}
@@ -130,20 +130,24 @@ def test_a_loss_at_a_point_warns():
     record = over_duty()
     record["duty"]["points"][0]["gains"][IMPACT] = {**GAIN, "percent": -3.0, "verdict": "worse"}
     (warning,) = (text for text, role in sentences(record).items() if role == "warning")
-    assert warning == "The pick is worse than the baseline at some points: impact force 3.00 ± 0.65 % more at idle."
+    assert (
+        warning
+        == "The selected design is worse than the baseline at some points: impact force 3.00 ± 0.65 % more at idle."
+    )
 
 
 def test_life_and_energy_over_the_duty():
     """Closed form: energy is the power weighted by the shares, its error that of the parts; life with its change and damage."""
     texts = list(sentences(over_duty()))
     assert any(
-        text.startswith("Life over the duty, L10r: 9000 h at the baseline, 8100 h at the pick (-10 %)")
+        text.startswith("Life over the duty, L10r: 9000 h at the baseline, 8100 h at the selected design (-10 %)")
         for text in texts
     )
     assert any("70 % of the damage at cruise" in text for text in texts)
     # 0.25 * 20 + 0.7 * 160 + 0.05 * 240 = 129, and 0.5 * hypot(0.25, 0.7, 0.05) = 0.37.
     assert (
-        "Energy lost in an hour of the duty: 129.00 ± 0.37 Wh at the baseline, 119.00 ± 0.37 Wh at the pick." in texts
+        "Energy lost in an hour of the duty: 129.00 ± 0.37 Wh at the baseline, 119.00 ± 0.37 Wh at the selected design."
+        in texts
     )
     record = over_duty()
     for life in record["duty"]["life"].values():
@@ -160,9 +164,7 @@ def test_mean_slip_is_weighted_by_the_shares():
         entry["baseline"]["cage_slip"] = {"value": slip, "statistical_error": 0.001, "numerical_error": None}
         entry["pick"]["cage_slip"] = {"value": 0.5 * slip, "statistical_error": 0.001, "numerical_error": None}
     (text,) = (text for text in sentences(record) if "Mean cage slip" in text)
-    assert text.endswith(
-        "Mean cage slip by shares of the time: 0.01400 ± 0.00074 at the baseline, 0.00700 ± 0.00074 at the pick."
-    )
+    assert text.endswith("Mean cage slip by time fraction: 0.01400 ± 0.00074 (baseline), 0.00700 ± 0.00074 (selected).")
 
 
 def test_gains_are_drawn_at_each_point_and_over_the_duty():

@@ -1,4 +1,4 @@
-"""The first screen of a study: its order, its tone, and why no better point is the pick."""
+"""The first screen of a study: its order, its tone, and why no better point is the selected design."""
 
 from __future__ import annotations
 
@@ -99,9 +99,13 @@ def test_a_limit_has_its_odds_or_the_command_for_them():
 @pytest.mark.parametrize(
     ("record", "words", "role"),
     [
-        (limited(), "Every limit is kept at the pick.", "statement"),
-        (limited(odds=[0.57, 0.51, 0.63]), "Not every limit is kept at the pick over", "warning"),
-        (limited(odds=[0.97, 0.93, 0.99]), "Every limit is kept at the pick and over the unknown inputs.", "statement"),
+        (limited(), "The selected design meets every limit.", "statement"),
+        (limited(odds=[0.57, 0.51, 0.63]), "The selected design does not meet every limit over", "warning"),
+        (
+            limited(odds=[0.97, 0.93, 0.99]),
+            "The selected design meets every limit and over the unknown inputs.",
+            "statement",
+        ),
     ],
 )
 def test_a_limit_is_good_news_only_where_it_is_kept_over_the_unknown_inputs_too(record, words, role):
@@ -112,7 +116,9 @@ def test_a_limit_is_good_news_only_where_it_is_kept_over_the_unknown_inputs_too(
 @pytest.mark.parametrize("verdict", ["broken", "undecided"])
 def test_the_sentence_on_a_missed_limit_does_not_repeat_the_danger(verdict):
     text = answer_text(Summary.from_dict(limited(verdict)))
-    assert "at the pick. " not in text and {"broken": "✗ broken", "undecided": "? undecided"}[verdict] in text
+    assert (
+        "at the selected design. " not in text and {"broken": "✗ broken", "undecided": "? undecided"}[verdict] in text
+    )
     assert "doe study study.toml --robust states the probabilities over the unknown inputs." in text
 
 
@@ -214,7 +220,7 @@ def test_a_better_point_that_speaks_for_itself_is_recommended(predicted):
     assert sentence.endswith("nothing that the study knows speaks against it: consider it.")
     forecast.at, forecast.searched = (lambda point: None), SimpleNamespace(name="adaptive")
     (sentence,) = rivals_sentences(forecast, simulated(study, surfaces, swapped, {name: 0.1}))
-    assert "not a point of the adaptive front, from which the pick is chosen" in sentence
+    assert "not a point of the adaptive front, from which the design is selected" in sentence
 
 
 def test_a_simulation_begins_with_bearing_point_and_date(monkeypatch):

@@ -48,7 +48,7 @@ def record() -> dict:
             "every_limit": [{"response": RESPONSES[2], **limit}],
         }
     whole["limits"] = {RESPONSES[2]: {**limit, "odds": None}}
-    whole["edge"]["sentence"] = "The pick lies 0.05 mm inside of the region."
+    whole["edge"]["sentence"] = "The selected design lies 0.05 mm inside of the region."
     whole["adaptive"] = searched()
     whole["tolerances_sentence"] = "95 % of the parts keep the gain of 3.25 ± 0.41 %."
     return whole
@@ -114,7 +114,7 @@ def test_a_terminal_breaks_sentences_between_words():
 
 def test_bad_news_has_a_word_and_a_class_of_its_own():
     """Unit: a warning begins with that word in all renderings, and no class of good news is on it."""
-    block = Paragraph("LIMIT BROKEN at the pick: power loss <= 250.", "warning")
+    block = Paragraph("LIMIT BROKEN at the selected design: power loss <= 250.", "warning")
     written = page.render(block)
     assert 'class="warning"' in written and "Warning:" in written and "statement" not in written
     assert terminal.text([block]).startswith("Warning: LIMIT BROKEN")

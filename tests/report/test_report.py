@@ -156,7 +156,7 @@ def test_pick_is_the_one_that_the_study_stands_by():
     words = " ".join(Outline(text).words)
     assert "Why this point: by what manufacture leaves of it." in words
     simulated = words[words.index("predicted by the surfaces and simulated, pick without tolerances") :]
-    # Its own simulated gain, not that of the pick.
+    # Its own simulated gain, not that of the selected design.
     assert "11.16 ± 0.65 % less" in simulated[:400] and "5.5" not in simulated[:200]
 
 
@@ -315,7 +315,7 @@ def test_beyond_the_edge_each_response_has_direction_and_unit():
     outward = Outward("upper", 0.25, "µm", "simulation", gains)
     told = outward.sentence("guide_clearance_mm", {"cage_speed_rpm": "max"})
     assert (
-        "The pick is at the upper bound of guide_clearance_mm, 0.25 mm. Extrapolated change per µm beyond it by simulation"
+        "The selected design is at the upper bound of guide_clearance_mm, 0.25 mm. Extrapolated change per µm beyond it by simulation"
         in told
     )
     assert (
@@ -358,9 +358,7 @@ def test_pictures_keep_their_words_off_the_curves(monkeypatch, tmp_path):
 def test_the_odds_of_the_gains_follow_these():
     """Odds that are no good news warn; names of responses are spelt, points of the robust front stand in a table."""
     names = RESPONSES
-    sentence = (
-        "Of 100 cases the pick is better in all of these in 57 (51 to 63): the gains depend on what is not known."
-    )
+    sentence = "Of 100 cases the selected design is better in all of these in 57 (51 to 63): the gains depend on what is not known."
     better = dict.fromkeys(names, Share(0.8, 0.7, 0.9))
     odds, factors = GainChances(better, Share(0.57, 0.51, 0.63)), dict.fromkeys(FACTORS, 0.1)
     front = RobustFront([], [ConfirmedGain("robust knee", "", factors, dict.fromkeys(names, 0.031), odds)], {})

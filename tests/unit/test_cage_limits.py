@@ -112,16 +112,20 @@ def test_the_probability_of_a_limit_is_the_share_of_its_classes(tmp_path):
 @pytest.mark.parametrize(
     ("at_pick", "code", "words"),
     [
-        ({"held": 8}, 0, "Cage: held (8 of 8 replicates) at the baseline, held (8 of 8 replicates) at the pick."),
+        (
+            {"held": 8},
+            0,
+            "Cage: held (8 of 8 replicates) at the baseline, held (8 of 8 replicates) at the selected design.",
+        ),
         (
             {"fast_whirl": 8},
             1,
-            "Danger: Limit cage.verdict = held: the class of the pick's cage is fast whirl (8 of 8 replicates)",
+            "Danger: Limit cage.verdict = held: the class of the selected design's cage is fast whirl (8 of 8 replicates)",
         ),
         (
             {"held": 5, "circling": 3},
             1,
-            "the class of the pick's cage is undecided (held in 5, circling in 3 of 8 replicates; two regimes last",
+            "the class of the selected design's cage is undecided (held in 5, circling in 3 of 8 replicates; two regimes last",
         ),
     ],
 )
@@ -219,7 +223,7 @@ def test_front_and_pick_stay_where_cages_keep_the_limit(tmp_path, monkeypatch, b
     if by == "design":
         assert record["pick"]["pocket_clearance_mm"] > 0.27
         assert re.fullmatch(
-            r"\d design runs of 20 are outside limits\.cage\.verdict\. Front and pick stay .*\.", *words
+            r"\d design runs of 20 are outside limits\.cage\.verdict\. Front and selected design stay .*\.", *words
         )
     else:
         assert record["tried"] == 2 and record["pick"]["pocket_clearance_mm"] != picks[0] and not words

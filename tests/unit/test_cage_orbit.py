@@ -77,7 +77,7 @@ def test_unit_noise_at_a_resting_place_is_a_jitter(make_scene):
         assert share.value == pytest.approx(2e-6 / RADIUS, rel=0.01)
         assert share.statistical_error < 0.05 * share.value
         (note,) = whirl_notes(scene, share)
-        assert "the cage does not whirl" in note and "radius of 2 um, 0.013 of the radial guide clearance" in note
+        assert "the cage does not whirl" in note and "radius is 2 um, 0.013 of the radial guide clearance" in note
 
 
 def test_unit_threshold(make_scene):
@@ -94,7 +94,7 @@ def test_unit_play_of_other_guidances(make_scene):
     assert lips.guide_clearance_m is None and lips.cage_play_m == pytest.approx(RADIUS)
     share = orbit_radius_share(lips, [run_at(noise(2e-6, (0.0, 0.0)))])
     assert share.value == pytest.approx(2e-6 / RADIUS, rel=0.01)
-    assert "of the radial play in its pockets" in whirl_notes(lips, share)[0]
+    assert "of the radial clearance in its pockets" in whirl_notes(lips, share)[0]
     loose = make_scene("model.guide_land=off")
     assert loose.cage_play_m is None and orbit_radius_share(loose, [run_at(circle(0.5))]) is None
     assert whirl_notes(loose, None) == ()
@@ -157,7 +157,7 @@ def test_unit_study_says_whose_whirl_is_a_jitter(tmp_path, outer_result):
     both = {"baseline": point(0.016), "pick": point(0.02)}
     found = whirl_sentence(study, both)
     assert "does not whirl" in found
-    assert "0.016 of its clearance at the baseline and 0.02 of its clearance at the pick" in found
+    assert "0.016 of its clearance at the baseline and 0.02 of its clearance at the selected design" in found
     assert whirl_sentence(study, both | {"pick": point(0.9)}).endswith("0.016 of its clearance at the baseline.")
     assert whirl_sentence(study, dict.fromkeys(both, point(0.9))) == ""
     assert whirl_sentence(study, dict.fromkeys(both, point(None))) == ""

@@ -145,7 +145,10 @@ def test_unit_dangers_of_a_choice():
     """Unit: a response worse beyond its error, a broken or undecided limit, a chain that misses; a kept one is no note."""
     gains = {"power_loss_W": Gain(-3.0, 1.0), "impact_force_N": Gain(-0.5, 1.0), "cage_slip": Gain(4.0, 1.0)}
     (worse,) = worse_notes(gains)
-    assert (worse.code, worse) == ("worse", "the pick is worse than the baseline: power loss 3.0 ± 1.0 % more")
+    assert (worse.code, worse) == (
+        "worse",
+        "the selected design is worse than the baseline: power loss 3.0 ± 1.0 % more",
+    )
     del gains["power_loss_W"]
     assert worse_notes(gains) == ()
     found = obstacles("broken", chains={"guide": "misses"}).notes

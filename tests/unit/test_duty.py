@@ -1,4 +1,4 @@
-"""A study over a duty: runs at every point, figures of all points with their errors, and what the pick costs at each."""
+"""A study over a duty: runs at every point, figures of all points with their errors, and what the selected design costs at each."""
 
 from __future__ import annotations
 

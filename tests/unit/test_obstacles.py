@@ -67,7 +67,7 @@ def test_a_limit_that_no_point_keeps_ends_in_a_report_with_the_best_point(tmp_pa
     assert sentences[0].startswith("No point of the region keeps all limits") and "relax the limits" in sentences[2]
     # The lower impact costs whirl, which this study wants large.
     worse, *obstacles = shown.stderr.splitlines()
-    assert worse.startswith("danger: the pick is worse than the baseline: whirl deviation ratio 31.")
+    assert worse.startswith("danger: the selected design is worse than the baseline: whirl deviation ratio 31.")
     assert obstacles == sentences
     assert "No point of the region keeps all limits" in (out / "report.html").read_text("utf-8")
     answer = (out / "answer.txt").read_text("utf-8")
@@ -103,7 +103,7 @@ def test_a_limit_that_only_the_surfaces_miss_is_kept_by_simulation(tmp_path, mon
     record = json.loads(shown.stdout)
     assert (shown.exit_code, record["status"]) == (0, "ok")
     (worse,) = shown.stderr.splitlines()
-    assert worse.startswith("danger: the pick is worse than the baseline: whirl deviation ratio ")
+    assert worse.startswith("danger: the selected design is worse than the baseline: whirl deviation ratio ")
     assert record["obstacles"]["sentences"] == [] and record["limits"]["impact_force_N"]["verdict"] == "kept"
 
 
@@ -261,12 +261,12 @@ def test_two_points_of_a_duty_are_shown_one_a_line(tmp_path, monkeypatch):
 
 
 def test_unit_what_to_relax_is_a_danger_ahead_of_a_worse_pick():
-    """Unit: where no point keeps the limits, what would be kept stands behind that and ahead of what the pick loses."""
+    """Unit: where no point keeps the limits, what would be kept stands behind that and ahead of what the selected design loses."""
     missed = MissedLimit("impact_force_N", None, "<=", 5.0, 37.0, 37.0, "undecided", 32.0, 56.0, 0.95)
     notes = Obstacles(False, (missed,), [], (), {}, "", {}).notes
-    dangers = of_level(ranked([Note("worse", "the pick is worse"), *notes]), Level.DANGER)
+    dangers = of_level(ranked([Note("worse", "the selected design is worse"), *notes]), Level.DANGER)
     assert [str(note) for note in dangers] == [
         *map(str, notes),
-        "the pick is worse",
+        "the selected design is worse",
     ] and "56 N would be kept" in dangers[1]
     assert [note.level for note in Obstacles(True, (missed,), [], (), {}, "", {}).notes] == [Level.WARNING] * 2

@@ -187,7 +187,7 @@ def test_region_ends_what_no_limit_ends():
 
 
 def test_pick_that_fails_or_just_keeps_leaves_no_tolerance():
-    for at, words in ((1.1, "even the exact pick"), (1.0, "as soon as parts differ")):
+    for at, words in ((1.1, "even the exact selected design"), (1.0, "as soon as parts differ")):
         found = widest_tolerances(first_factor, [at, 0.0], [1.0], [1.0, 1.0], names=["x"], **BOX)
         assert found.half_widths.tolist() == [0.0, 0.0]
         assert words in found.sentence and found.limited_by == "x"

@@ -1,4 +1,4 @@
-"""How often a simulated point is the pick under the errors of its simulation."""
+"""How often a simulated point is the selected design under the errors of its simulation."""
 
 import math
 

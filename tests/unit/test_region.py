@@ -441,7 +441,7 @@ def test_a_study_is_not_lost_where_runs_fail(failing, tmp_path):
 
 
 def test_a_pick_that_fails_gives_way(failing, tmp_path):
-    """The boundary lies a little above where the runs say: the pick there fails, and the next one is simulated."""
+    """The boundary lies a little above where the runs say: the selected design there fails, and the next one is simulated."""
     outcome = run_study(failing, tmp_path, 1, lambda title: silent)
     assert outcome.pick.point[0] >= 0.37 and not isinstance(outcome.pick, Failure)
     assert outcome.notes[0].startswith("3 design runs failed") and len(outcome.design.coded) == 13

@@ -1,4 +1,4 @@
-"""What a report tells of a search in few runs: fronts on one scale, where runs were spent, what holds the pick."""
+"""What a report tells of a search in few runs: fronts on one scale, where runs were spent, what holds the selected design."""
 
 from __future__ import annotations
 
@@ -114,7 +114,7 @@ def test_sentences_say_pick_end_hold_trust_and_hypervolumes(studied):
     for name, gain in record["gains"].items():
         assert f"{name} {abs(gain['percent']):.2f} %" in answer
     assert f"because {record['adaptive']['stopped']}. It took {record['adaptive']['runs']} runs" in spent
-    assert held == record["adaptive"]["held"] and held.startswith("What limits the pick: ")
+    assert held == record["adaptive"]["held"] and held.startswith("What limits the selected design: ")
     fresh = outcome.adaptive.search
     claimed = np.hypot(fresh.bias, fresh.spread)
     assert all(f"{times:.1f}" in trust for times in claimed)
@@ -122,7 +122,7 @@ def test_sentences_say_pick_end_hold_trust_and_hypervolumes(studied):
     compared = record["adaptive"]["compared"]
     assert f"({100.0 * compared['surfaces'] / compared['search'][-1]:.0f} % of the first)" in beside
     page = (folder / "report.html").read_text(encoding="utf-8")
-    assert page.index('class="tiles"') < page.index("The pick has") < page.index("The search ended because")
+    assert page.index('class="tiles"') < page.index("The selected design has") < page.index("The search ended because")
 
 
 def foretelling(predict, faces=()):

@@ -26,8 +26,8 @@ def bent(coded):
 
 @pytest.mark.parametrize("error", [0.0, 0.5])
 def test_limit_case_draws_about_a_pick(tmp_path, error):
-    """Limit case: of a search that knows its function, parts differ from the pick as the function does, and all of them by
-    the errors of the pick's own runs, the baseline by those of its own."""
+    """Limit case: of a search that knows its function, parts differ from the selected design as the function does, and all of them by
+    the errors of the selected design's own runs, the baseline by those of its own."""
     study = Problem.load(short_study(tmp_path))
     points = 2.0 * qmc.Sobol(3, seed=1).random_base2(6) - 1.0
     values = bent(points * study.reach)

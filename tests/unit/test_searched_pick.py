@@ -1,4 +1,4 @@
-"""The pick of the simulator's own front: what tolerances leave of it, and its limits."""
+"""The selected design of the simulator's own front: what tolerances leave of it, and its limits."""
 
 from __future__ import annotations
 

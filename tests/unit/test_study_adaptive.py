@@ -104,7 +104,10 @@ def test_the_study_follows_the_adaptive_front(tmp_path, monkeypatch):
     assert found["chosen"]["row"] == chosen.row
     share = found["chosen"]["share"]
     assert 0.0 < share <= 1.0 and chosen.shares.sum() == pytest.approx(1.0)
-    assert f"it is the pick in {100.0 * share:.0f} of 100 draws of the simulation's errors" in outcome.pick.reason
+    assert (
+        f"the same point is selected in {100.0 * share:.0f} of 100 draws of the simulation's errors"
+        in outcome.pick.reason
+    )
     assert not any("--adaptive" in note["text"] for note in record["notes"])
     with (tmp_path / "front.csv").open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
@@ -114,7 +117,7 @@ def test_the_study_follows_the_adaptive_front(tmp_path, monkeypatch):
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert "in few runs" in page and "The search ended because" in page
     text = (tmp_path / "answer.txt").read_text(encoding="utf-8")
-    assert "\nThe pick has radial clearance " in text and "\nWhat limits the pick: " in text
+    assert "\nThe selected design has radial clearance " in text and "\nWhat limits the selected design: " in text
 
 
 def test_invariant_same_bits_for_any_number_of_workers_and_after_an_interruption(tmp_path, monkeypatch):
@@ -157,7 +160,7 @@ def test_points_are_on_the_drawing_and_inside():
 
 
 def test_the_region_grows_within_what_is_allowed(tmp_path, monkeypatch):
-    """Responses that are planes: the pick goes as far as it may, and the record says what holds it."""
+    """Responses that are planes: the selected design goes as far as it may, and the record says what holds it."""
     instantly(monkeypatch.setattr)
     pocket = 'key = "cage.pocket_clearance_mm"\n'
     path = written(tmp_path, (pocket, f"{pocket}allowed = [0.15, 0.40]\n"), budget=60)

@@ -36,7 +36,7 @@ def mounted_study(folder: Path, cage: float = 100.0) -> Problem:
 
 
 def test_unit_operating_clearances_of_two_designs(tmp_path):
-    """Unit: of every factor that is a clearance what its scene has in operation, and the class of the pick's radial one."""
+    """Unit: of every factor that is a clearance what its scene has in operation, and the class of the selected design's radial one."""
     study = mounted_study(tmp_path)
     scenes = scenes_of(study, study.baseline, study.baseline + np.array([0.0, 0.05, 0.1]))
     found = operating_clearances(study, scenes)
@@ -47,7 +47,7 @@ def test_unit_operating_clearances_of_two_designs(tmp_path):
     assert guide["pick"] - guide["baseline"] == pytest.approx(0.05, abs=1e-4)
     assert radial["pick"] == pytest.approx(scenes["pick"].mounted_clearance_mm) == radial["baseline"]
     assert found.class_sentence == (
-        "ISO 5753-1 at a bore of 27 mm: the pick's radial clearance of 20 um falls in C2 (0 to 25 um), also in CN (20 to 45 um)."
+        "ISO 5753-1 at a bore of 27 mm: the selected radial clearance of 20 um falls in C2 (0 to 25 um), also in CN (20 to 45 um)."
     )
 
 
@@ -61,7 +61,7 @@ def test_unit_a_study_shows_drawn_and_operating_clearances(tmp_path, monkeypatch
     scene = outcome.study.confirmation_scene(outcome.pick.point)
     assert plays["guide_clearance_mm"]["pick"] == pytest.approx(1e3 * scene.clearances["guide"].operating)
     assert "baseline in operation" in text and f"{plays['pocket_clearance_mm']['pick']:.3f}" in text
-    assert record.clearance_class.startswith("ISO 5753-1 at a bore of 27 mm: the pick's radial clearance of ")
+    assert record.clearance_class.startswith("ISO 5753-1 at a bore of 27 mm: the selected radial clearance of ")
     assert record.clearance_class in text
 
 

@@ -168,7 +168,7 @@ def test_the_edge_is_named_with_the_gain_beyond_it(tmp_path):
     gain, error = outward.gains["impact_force_N"].value, outward.gains["impact_force_N"].error
     assert gain == pytest.approx(0.04, rel=1e-4) and error < 1e-6
     assert (
-        "The pick is at the upper bound of guide_clearance_mm, " in edge.sentence
+        "The selected design is at the upper bound of guide_clearance_mm, " in edge.sentence
         and "50 % of the front" in edge.sentence
     )
     inside = SimpleNamespace(point=study.centre)
@@ -183,12 +183,12 @@ def test_unit_one_rule_says_where_a_point_lies(tmp_path):
     assert [(bool(each.bounds), each.beyond) for each in places.values()] == [
         (False, False), (False, False), (False, True), (True, True),
     ]  # fmt: skip
-    assert places[0.5].sentence("The pick") == ""
-    assert places[0.9].sentence("The pick").startswith("The pick lies farther out than any run")
+    assert places[0.5].sentence("The selected design") == ""
+    assert places[0.9].sentence("The selected design").startswith("The selected design is farther out than any run")
     corner = places[1.0].sentence("The point")
     assert set(places[1.0].at_bounds) == set(study.factors) and set(places[1.0].at_bounds.values()) == {"upper"}
     assert "at the upper bound of radial_clearance_mm" in corner and "surfaces extrapolate" in corner
-    for share, words in ((0.5, "The pick lies inside the region; 50 %"), (0.9, "farther out than any run")):
+    for share, words in ((0.5, "The selected design lies inside the region; 50 %"), (0.9, "farther out than any run")):
         point = SimpleNamespace(point=study.actual(share * reach))
         edge = edge_of(study, point, np.array([study.centre, study.actual(reach)]), None, None)
         assert words in edge.sentence and edge.beyond_runs == ("inside" not in edge.sentence)

@@ -98,7 +98,7 @@ def test_confirmation_that_fails_ends_the_study_in_a_sentence(tmp_path, monkeypa
         with pytest.raises(RunError, match=r"^the original design cannot be simulated: baseline: .*the oil froze$"):
             simulate_original(study, simulations)
         original = Confirmed(study.baseline, *np.ones((3, 3)))
-        with pytest.raises(RunError, match=r"^confirmation of the pick: .*the oil froze$"):
+        with pytest.raises(RunError, match=r"^confirmation of the selected design: .*the oil froze$"):
             confirm(study, original, {"pick": Choice(study.baseline * 1.1, "why not")}, simulations)
     with Store(tmp_path / STORE, read_only=True) as store:
         assert [run.status for run in store.ended()] == ["failed", "failed"]

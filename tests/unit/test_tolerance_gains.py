@@ -115,8 +115,8 @@ def test_closed_form_of_a_gain_at_least(planes):
     ("settings", "point", "words"),
     [
         ({"at_least": {LOSS: 5.0}}, PICK, "at_least.power_loss_W = 5 exceeds the predicted gain of 0.6 %; state less."),
-        ({"gains": [LOSS]}, -PICK, "the pick has no gain in power loss to keep; leave it out of [tolerances]."),
-        ({}, -PICK, "No tolerances follow, for the pick has no gain to keep and no response has a limit."),
+        ({"gains": [LOSS]}, -PICK, "the selected design has no gain in power loss to keep; leave it out of [tolerances]."),
+        ({}, -PICK, "No tolerances follow, because the selected design has no gain to keep and no response has a limit."),
     ],
 )  # fmt: skip
 def test_unit_gains_that_the_pick_does_not_have(planes, settings, point, words):

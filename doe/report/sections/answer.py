@@ -71,9 +71,13 @@ def _judged(summary: Summary) -> list[Block]:
         # The dangers above say which limits are missed, and by how much.
         return [table, *([_command_for_odds(summary)] if summary.limits else ())]
     if min(odds, default=1.0) < NEARLY_ALL:
-        return [table, Paragraph("Not every limit is kept at the pick over the unknown inputs.", "warning")]
+        return [table, Paragraph("The selected design does not meet every limit over the unknown inputs.", "warning")]
     everywhere = " and over the unknown inputs" if odds else ""
-    return [table, Paragraph(f"Every limit is kept at the pick{everywhere}.", "statement"), _command_for_odds(summary)]
+    return [
+        table,
+        Paragraph(f"The selected design meets every limit{everywhere}.", "statement"),
+        _command_for_odds(summary),
+    ]
 
 
 def _cages(summary: Summary) -> str:
@@ -83,10 +87,10 @@ def _cages(summary: Summary) -> str:
         return ""
     pairs = {point: (before[point].short_words, after[point].short_words) for point in after if point in before}
     if len(set(pairs.values())) > 1:
-        return f"Cage: {'; '.join(f'{point}: {old} at the baseline, {new} at the pick' for point, (old, new) in pairs.items())}."
+        return f"Cage: {'; '.join(f'{point}: {old} at the baseline, {new} at the selected design' for point, (old, new) in pairs.items())}."
     old, new = next(iter(pairs.values()))
     everywhere = ", at every point of the duty" if len(pairs) > 1 else ""
-    return f"Cage: {old} at the baseline, {new} at the pick{everywhere}."
+    return f"Cage: {old} at the baseline, {new} at the selected design{everywhere}."
 
 
 def _command_for_odds(summary: Summary) -> Paragraph:
@@ -140,7 +144,7 @@ def _edge(edge: Edge) -> str:
         for name, bound in edge.factors.items()
     ]
     if bounds:
-        return f"The pick is at {' and '.join(bounds)}: a wider design may find more."
+        return f"The selected design is at {' and '.join(bounds)}: a wider design may find more."
     return f"{edge.sentence.partition('; ')[0].rstrip('.')}."
 
 
@@ -196,9 +200,9 @@ def _temperatures(points: Mapping[str, ConfirmedPoint]) -> list[Block]:
         (quantity(name)[0], baseline[name].text, figure.text, range_ends(ranges[TEMPERATURES[name]]) if ranges else "")
         for name, figure in pick.items()
     ]
-    header = ("steady state [°C]", "baseline", "pick", "pick over inputs (90 %)")
+    header = ("steady state [°C]", "baseline", "selected", "selected, over inputs (90 %)")
     note = "Inputs: unknown conductances, shares of the heat and level of the loss. Errors: of the simulation (95 %)."
-    others = [Paragraph(f"The pick {other_ranges(ranges)}.", "small")] if ranges else []
+    others = [Paragraph(f"The selected design {other_ranges(ranges)}.", "small")] if ranges else []
     return [Table("Temperatures", header, rows, note), *others]
 
 
@@ -235,7 +239,7 @@ def _chosen(summary: Summary, inputs: Sequence[Factor]) -> Table:
     baseline = summary.confirmation["baseline"].factors
     columns: tuple[Column[Factor], ...] = (
         Column("", words="", cell=lambda factor: label(factor.name)),
-        Column("", words="pick", cell=lambda factor: factor.text(summary.pick[factor.name])),
+        Column("", words="selected", cell=lambda factor: factor.text(summary.pick[factor.name])),
         Column("", words="tolerance", cell=tolerance),
         Column("", words="baseline", cell=lambda factor: factor.text(baseline[factor.name])),
         Column("", words="in operation", cell=lambda factor: factor.text(in_operation(summary, factor, "pick")[0])),
@@ -263,7 +267,7 @@ def tolerance_of(summary: Summary, factor: Factor) -> float | None:
 def _gains(summary: Summary) -> Table:
     before, after = (summary.confirmation[name].responses for name in ("baseline", "pick"))
     rows = [(label(name), before[name].text, after[name].text, signed(gain)) for name, gain in summary.gains.items()]
-    header = ("response", "baseline", "pick", "change")
+    header = ("response", "baseline", "selected", "change")
     where = " over the duty" if summary.duty else ""
     return Table(f"Changes{where} confirmed by simulation (95 % intervals)", header, rows, SIGNS_NOTE)
 
@@ -295,7 +299,7 @@ def _limits_judged(summary: Summary) -> Table:
             )
         )
     shares = "kept over unknown inputs [%]"
-    header = ("limit", "pick", "verdict", "probability", shares, "baseline")
+    header = ("limit", "selected", "verdict", "probability", shares, "baseline")
     return Table("Limits judged by simulation", header, rows, text_columns=(2,))
 
 

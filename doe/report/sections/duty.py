@@ -36,7 +36,7 @@ def duty(summary: Summary, motion: Mapping[str, Any]) -> Section | None:
     """The points of the duty with all figures there."""
     if summary.duty is None:
         return None
-    caption = "Gain of the pick over the baseline at each point, and over the duty, with 95 % intervals."
+    caption = "Gain of the selected design over the baseline at each point, and over the duty, with 95 % intervals."
     pictures = Figures([still.svg for still in gain_stills(summary)], caption, "duty")
     blocks = [_points(summary.duty), pictures, *costs(summary), _clearances(summary), duty_figures(summary).block]
     return Section("duty", "The duty", blocks)
@@ -59,7 +59,7 @@ def at_points(summary: Summary) -> list[Block]:
     ]
     header = ("point", "share", *(quantity(name)[0] for name in names), "limits")
     return [
-        Table("Pick against baseline at each point of the duty (95 % intervals)", header, rows, SIGNS_NOTE),
+        Table("Selected design against baseline at each point of the duty (95 % intervals)", header, rows, SIGNS_NOTE),
         Paragraph(_aggregates(summary.duty), "small"),
         Paragraph(_losses(points), "warning"),
         Paragraph(_worst(summary.duty)),
@@ -101,7 +101,7 @@ def _losses(points: Sequence[AtPoint]) -> str:
         for name, gain in point.gains.items()
         if gain.verdict == "worse"
     ]
-    return f"The pick is worse than the baseline at some points: {', '.join(losses)}." if losses else ""
+    return f"The selected design is worse than the baseline at some points: {', '.join(losses)}." if losses else ""
 
 
 def _worst(duty: DutyAnswer) -> str:
@@ -111,7 +111,7 @@ def _worst(duty: DutyAnswer) -> str:
         before = duty.worst["baseline"].get(name)
         as_before = before is not None and before.point == worst.point
         other = ", as at the baseline" if as_before else f", at the baseline {before.words}" if before else ""
-        sentences.append(f"Worst point of {quantity(name)[0]} at the pick: {worst.words}{other}.")
+        sentences.append(f"Worst point of {quantity(name)[0]} at the selected design: {worst.words}{other}.")
     return " ".join(sentences)
 
 
@@ -127,9 +127,9 @@ def _dearest(points: Sequence[AtPoint]) -> str:
     if not any(point.own for point in points):
         return ""
     if not costs:
-        return "The compromise costs no point more than the errors of its surfaces: no pick for one point alone is better there."
+        return "The compromise costs no point more than the errors of its surfaces: no design for one point alone is better there."
     _, words, size, name = max(costs)
-    return f"The compromise costs most at {name}: a pick for that point alone has {words} {size} on its surfaces."
+    return f"The compromise costs most at {name}: a design for that point alone has {words} {size} on its surfaces."
 
 
 def _life(life: Mapping[str, LifeOverDuty]) -> str:
@@ -141,7 +141,7 @@ def _life(life: Mapping[str, LifeOverDuty]) -> str:
     most = max(after.damage, key=after.damage.__getitem__)
     share = f", {100.0 * after.damage[most]:.0f} % of the damage at {most}" if len(after.damage) > 1 else ""
     return (
-        f"Life over the duty, L10r: {shown(before.L10_h, 3)} h at the baseline, {shown(after.L10_h, 3)} h at the pick "
+        f"Life over the duty, L10r: {shown(before.L10_h, 3)} h at the baseline, {shown(after.L10_h, 3)} h at the selected design "
         f"({gain:+.2g} %); equivalent load {shown(after.equivalent_load_N, 4)} N{share}."
     )
 
@@ -152,10 +152,10 @@ def _energy(points: Sequence[AtPoint]) -> str:
     sentences = []
     if power:
         sentences.append(
-            f"Energy lost in an hour of the duty: {power[0]} Wh at the baseline, {power[1]} Wh at the pick."
+            f"Energy lost in an hour of the duty: {power[0]} Wh at the baseline, {power[1]} Wh at the selected design."
         )
     if slip:
-        sentences.append(f"Mean cage slip by shares of the time: {slip[0]} at the baseline, {slip[1]} at the pick.")
+        sentences.append(f"Mean cage slip by time fraction: {slip[0]} (baseline), {slip[1]} (selected).")
     return " ".join(sentences)
 
 
@@ -185,7 +185,7 @@ def _points(duty: DutyAnswer) -> Table:
         )
         for point in duty.points
     ]
-    header = ("point", "share of time", "keys of the scene", "life at the baseline [h]", "at the pick [h]")
+    header = ("point", "share of time", "keys of the scene", "life at the baseline [h]", "at the selected design [h]")
     note = "Life at each point alone: ISO/TS 16281, static loads at the operating clearance."
     return Table("Points of the duty", header, rows, note, text_columns=(2,))
 
@@ -206,7 +206,7 @@ def costs(summary: Summary) -> Iterator[Block]:
         if point.own
     ]
     header = ("point", *map(label, asked.columns), *(quantity(name)[0] for name in names))
-    note = f"Change from the study's pick to that of the point alone, on the surfaces of its runs. {SIGNS_NOTE}"
+    note = f"Change from the selected design to one for this point alone, on the surfaces of its runs. {SIGNS_NOTE}"
     yield Table("What the compromise costs", header, rows, note)
     yield from (Paragraph(point.own_note) for point in points if point.own_note)
 
@@ -306,7 +306,7 @@ DUTY_POINTS: tuple[Column[DutyFigure], ...] = (
         words="change",
         at=("gain", "percent"),
         cell=lambda row: "" if row.gain is None else signed(row.gain),
-        meaning="gain of the pick on the baseline at the point, positive where better, and its half width",
+        meaning="gain of the selected design on the baseline at the point, positive where better, and its half width",
     ),
     Column("improvement_error_percent", at=("gain", "error_percent"), screen=False),
     Column(
@@ -319,7 +319,7 @@ DUTY_POINTS: tuple[Column[DutyFigure], ...] = (
         "own_pick_percent",
         at=("cost", "percent"),
         screen=False,
-        meaning="cost of the compromise: gain of the pick for this point alone on the study's pick, by its surfaces, and its half width",
+        meaning="cost of the compromise: improvement of the design for this point alone over the selected design, by its surfaces, and its half width",
     ),
     Column("own_pick_error_percent", at=("cost", "error_percent"), screen=False),
     Column(

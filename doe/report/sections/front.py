@@ -40,7 +40,7 @@ def front_sheet(factors: Sequence[str], responses: Sequence[str], points: Sequen
 def front(summary: Summary, motion: Mapping[str, Any]) -> Section:
     """Pictures that answer to the pointer, the picks, and what they are compared with."""
     marks, result = picks(summary), summary.front
-    where = f"of the {WITHOUT}" if WITHOUT in marks else "of the pick"
+    where = f"of the {WITHOUT}" if WITHOUT in marks else "of the selected design"
     blocks = _pictures(summary.asked, fronts(summary), marks, summary.confirmation)
     blocks += _judged(summary.asked, result, marks, where)
     blocks += [tolerances(summary.tolerances or {}), Paragraph(summary.tolerances_sentence or ""), *_search(result)]
@@ -55,7 +55,7 @@ def front_blocks(asked: Asked, result: SurfaceFront) -> list[Block]:
     return [
         _picks("Every point of the front", asked, points, Detail.ALL),
         *_pictures(asked, _fronts(asked, result), marks, {}),
-        *_judged(asked, result, marks, "of the pick"),
+        *_judged(asked, result, marks, "of the selected design"),
         *_search(result),
         *_with_tolerances(asked, result.tolerance_aware),
         *_stated_point(result),
@@ -66,7 +66,7 @@ def _judged(asked: Asked, result: SurfaceFront, marks: Mapping[str, Point], wher
     """The picks, the gains and limits at the pick, and what to think of them."""
     size = f"{len(result.front)} of {result.archive} points"
     return [
-        _picks(f"Picks of the Pareto front on the surfaces, {size} (95 % intervals of the mean)", asked, marks),
+        _picks(f"Selected points of the front on the surfaces, {size} (95 % intervals of the mean)", asked, marks),
         _gains(f"Changes on the surfaces {where}", result.predicted_gains),
         Paragraph(result.statement),
         *_doubt(result),
@@ -191,13 +191,13 @@ def _doubt(result: SurfaceFront) -> list[Block]:
     )
     dominance = result.pick_dominates_baseline
     odds = with_error(dominance.probability, 1.96 * dominance.standard_error)
-    pick = "The pick" if result.tolerance_aware is None else f"The {WITHOUT}"
+    pick = "The selected design" if result.tolerance_aware is None else f"The {WITHOUT}"
     return [
         Paragraph(f"Selection bias to expect in these gains: {biases}." if biases else ""),
         Paragraph(
             f"{pick} dominates the baseline with probability {odds} on {dominance.draws} surfaces drawn from their errors (error of the draws alone)."
         ),
-        Paragraph(f"Pick on the surfaces: {result.pick.reason}.", "small"),
+        Paragraph(f"Selected on the surfaces: {result.pick.reason}.", "small"),
     ]
 
 
@@ -274,7 +274,7 @@ def _with_tolerances(asked: Asked, aware: ToleranceFront | None) -> list[Block]:
     if survival.plain_pick is not None and survival.pick is not None:
         plain = share_with_interval(survival.plain_pick, survival.plain_pick_interval)
         at_pick = share_with_interval(survival.pick, survival.pick_interval)
-        sentences.append(f"Parts that still dominate the baseline: {plain} at the {WITHOUT}, {at_pick} at the pick.")
+        sentences.append(f"Parts that still beat the baseline: {plain} ({WITHOUT}), {at_pick} (selected).")
     sentences.append(survival.open_errors)
     if not aware.plain_pick_inside:
         sentences.append(

@@ -40,7 +40,7 @@ SCALE = (
     "Hypervolume: share of all combinations of the responses, between the best and the worst of each on these fronts, that a "
     "front dominates. Larger is better; all fronts are on one scale."
 )
-SPENT = "Where each run was spent and why; the larger a mark, the more replicates. Star: the pick."
+SPENT = "Where each run was spent and why; the larger a mark, the more replicates. Star: the selected design."
 
 
 def in_few_runs(summary: Summary) -> list[Block]:
@@ -183,7 +183,7 @@ def search_sentences(outcome: StudyResult) -> list[str]:
 def _answer(outcome: StudyResult) -> str:
     places = [_place(*value) for value in outcome.study.by_factor(outcome.pick.point).items()]
     gains = [f"{name} {improvement(gain.percent, None, gain.goal)}" for name, gain in outcome.gains["pick"].items()]
-    return f"The pick has {_listed(places)}: by simulation {_listed(gains)} than the baseline."
+    return f"The selected design has {_listed(places)}: by simulation {_listed(gains)} than the baseline."
 
 
 def spent_sentence(study: Problem, adaptive: Adaptive) -> str:
@@ -215,7 +215,7 @@ def limiting_sentence(outcome: StudyResult) -> str:
     why += [f"the limit {limit.text} is near" for limit in near_limits(adaptive, study, outcome.limits)]
     refused = [name for name, chain in outcome.chains.items() if chain.refused]
     why += [f"the parts of dimension chain {name} cannot be made" for name in refused]
-    return f"What limits the pick: {'; '.join(why)}."
+    return f"What limits the selected design: {'; '.join(why)}."
 
 
 def _why(study: Problem, pull: Pull) -> str:

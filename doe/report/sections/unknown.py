@@ -233,10 +233,10 @@ DECIDERS: tuple[Column[Decider], ...] = (
     ),
     Column(
         "pick_above",
-        words="pick is better",
+        words="selected is better",
         cell=lambda decider: "above" if decider.pick_above else "below",
         text=True,
-        meaning="whether the pick is better above the flip",
+        meaning="whether the selected design is better above the flip",
     ),
 )
 
@@ -265,9 +265,9 @@ def _odds(robust: Robust) -> Table:
         (quantity(name)[0], share.of_hundred, _percent(robust.explained[name]))
         for name, share in robust.chances.gains.items()
     ]
-    header = ("response", "pick better [%]", "explained by the inputs")
+    header = ("response", "selected better [%]", "explained by the inputs")
     every = ("all of these", robust.chances.all.of_hundred, "")
-    return Table("Probability that the pick is better than the original", header, [*rows, every])
+    return Table("Probability that the selected design is better than the original", header, [*rows, every])
 
 
 def _limits(summary: Summary) -> Table:
@@ -283,7 +283,7 @@ def _limits(summary: Summary) -> Table:
 def decider_sheet(robust: Robust) -> Sheet[Decider]:
     """By input: what measuring it is worth, and the value at which the choice flips."""
     note = "Points: by how much of 100 the chance of the right choice rises."
-    content = "The inputs that decide between the pick and the original, by worth."
+    content = "The inputs that decide between the selected design and the original, by worth."
     return Sheet("Inputs that decide", DECIDERS, robust.decides, note, file="decides.csv", content=content)
 
 
