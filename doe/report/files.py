@@ -12,7 +12,7 @@ import numpy as np
 from doe import clearance
 from doe.report.identity import study_identity
 from doe.report.page import html_report, notes, reference
-from doe.report.sections.answer import changes, first_screen
+from doe.report.sections.answer import changes, first_screen, good_news
 from doe.report.sections.chain import chains, part_sheet
 from doe.report.sections.design import run_sheet
 from doe.report.sections.duty import costs, duty_figures, gain_stills
@@ -127,7 +127,7 @@ def blocks(result: Summary) -> list[Block]:
     ]
     return readable(
         [
-            Verdict(tuple(result.notes)),
+            Verdict(tuple(result.notes), good=good_news(result)),
             *first_screen(result),
             *notes(result, {}).blocks,
             *(replace(block, detail=Detail.ALL) for block in details),

@@ -237,7 +237,9 @@ def settings(summary: Summary, motion: Motions) -> Section:
 
 def notes(summary: Summary, motion: Motions) -> Section:
     """Runs that failed, and limits of the model that the runs met."""
-    return Section("notes", "Notes and failures", [failure_table(summary.failures), Remarks(tuple(summary.notes))])
+    return Section(
+        "notes", "Notes and failures", [failure_table(summary.failures), Remarks(tuple(summary.notes), gathers=True)]
+    )
 
 
 CHAPTERS = (

@@ -30,6 +30,7 @@ from doe.workflow.surfaces import independent_values, standard_errors
 from rbdyn.base.arrays import Array, Whole, one_thread
 from rbdyn.base.faults import InputError, MethodError, RunError, refuse
 from rbdyn.base.records import Record
+from rbdyn.base.words import counted
 
 SIGNIFICANT = 0.05
 # Share of the half range of the region within which points are twins, if the drawing has no resolution.
@@ -206,9 +207,10 @@ def advice(study: Problem) -> list[str]:
     if not lacking:
         return []
     design = len(study.design.coded)
+    where = "every response" if len(lacking) == len(study.surfaces) > 1 else ", ".join(lacking)
     return [
-        f"the predicted front is biased, because lack of fit is significant for {', '.join(lacking)}. Use --adaptive: it searches "
-        f"with emulators and needs {max(study.file.adaptive.budget - design, 0)} more runs"
+        f"the predicted front is biased by lack of fit in {where}. Use --adaptive "
+        f"({counted(max(study.file.adaptive.budget - design, 0), 'more run')})"
     ]
 
 

@@ -216,11 +216,11 @@ def whirl_sentence(study: Problem, confirmed: Mapping[str, Confirmed]) -> str:
         result = confirmed[name].result
         if result is not None and result.jitters and result.cage_orbit_radius_share is not None:
             points = ", ".join(result.jitter_points) if isinstance(result, DutyResult) else ""
-            where = f"at the {point_words(name)}{f' ({points})' if points else ''}"
-            radii.append(f"{result.cage_orbit_radius_share.value:.2g} of its clearance {where}")
+            where = f"{point_words(name)}{f' ({points})' if points else ''}"
+            radii.append(f"{where} {result.cage_orbit_radius_share.value:.2g}")
     if WHIRL not in objectives or not radii:
         return ""
-    return f"The {WHIRL} has little meaning, because the cage does not whirl: its orbit has a radius of {' and '.join(radii)}."
+    return f"Do not choose by the {WHIRL}: the cage does not whirl (orbit over clearance: {', '.join(radii)})."
 
 
 def statement(gains: Mapping[str, Gain]) -> str:

@@ -256,7 +256,7 @@ class PickTolerances:
             sentences.append(
                 f"The design region limits the tolerance to parts finer than {grade}: {self._listed(rim)}."
             )
-            sentences.append("A wider region would allow wider tolerances.")
+            sentences.append("Try a wider region.")
         return " ".join(sentences)
 
     def _listed(self, names: Sequence[str]) -> str:

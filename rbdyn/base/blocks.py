@@ -47,25 +47,35 @@ class Paragraph:
 
 @dataclass(frozen=True)
 class Verdict:
-    """Every danger among the notes of a result, or, where dangers are ``judged``, that there is none; renderings begin with it."""
+    """Every danger among the notes of a result, or, where dangers are ``judged``, that there is none; renderings begin with it.
+
+    ``good``: what is well, before the words that there is no danger; ``warnings``: number of those that are none of the notes.
+    """
 
     notes: Notes
     judged: bool = True
+    good: str = ""
+    warnings: int = 0
     detail: Detail = Detail.LEAST
 
     @property
     def paragraphs(self) -> list[Paragraph]:
         """The verdict first."""
-        further = of_level(condensed(self.notes), DANGER)[1:]
-        role: Role = "danger" if of_level(self.notes, DANGER) else ""
-        return [Paragraph(verdict(self.notes), role), *(Paragraph(note, "danger") for note in further)]
+        dangers = of_level(condensed(self.notes), DANGER)
+        if dangers:
+            return [Paragraph(note, "danger") for note in dangers]
+        return [Paragraph(" ".join(filter(None, [self.good, verdict(self.notes, self.warnings)])))]
 
 
 @dataclass(frozen=True)
 class Remarks:
-    """The notes of a result that are no dangers, the worst first; below full detail the first of them, merged."""
+    """The notes of a result that are no dangers, the worst first; below full detail the first of them, merged.
+
+    ``gathers``: whether a terminal shows the warnings of all other blocks among them.
+    """
 
     notes: Notes
+    gathers: bool = False
     detail: Detail = Detail.USUAL
 
     @property

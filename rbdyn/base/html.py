@@ -60,11 +60,10 @@ def render(block: Block) -> str:
         case Bullets(items):
             return f"<ul>{''.join(f'<li>{prose(item)}</li>' for item in items)}</ul>"
         case Table():
-            return (
-                _table(block)
-                if block.tiles is None
-                else f'<dl class="tiles">{"".join(_tile(block, row) for row in block.rows)}</dl>'
-            )
+            if block.tiles is None:
+                return _table(block)
+            tiles = "".join(_tile(block, row) for row in block.rows)
+            return f'<dl class="tiles">{tiles}</dl>{_note(block)}'
         case Figures(pictures, caption, key):
             name = f' id="{key}"' if key else ""
             words = f"<figcaption>{escape(caption)}</figcaption>" if caption else ""
@@ -91,6 +90,10 @@ def _tile(table: Table, row: Sequence[str]) -> str:
     return f'<div class="tile"><dt>{escape(name)}</dt><dd><strong>{escape(row[1])}{small}</strong>{further}</dd></div>'
 
 
+def _note(table: Table) -> str:
+    return f'<p class="note">{escape(table.note)}</p>' if table.note else ""
+
+
 def _table(table: Table) -> str:
     words = {0, *table.text_columns}
     heads = enumerate(table.header)
@@ -99,10 +102,9 @@ def _table(table: Table) -> str:
     for name, *cells in table.rows:
         columns = "".join(f"<td{_kind(place, words)}>{_cell(cell)}</td>" for place, cell in enumerate(cells, 1))
         rows.append(f"<tr><th scope='row'>{escape(name)}</th>{columns}</tr>")
-    note = f'<p class="note">{escape(table.note)}</p>' if table.note else ""
     caption, sort = escape(table.caption), ' class="sortable"' if table.sortable else ""
     inside = f"<caption>{caption}</caption><thead><tr>{header}</tr></thead><tbody>{''.join(rows)}</tbody>"
-    body = f'<div class="scroll" role="region" aria-label="{caption}"><table{sort}>{inside}</table></div>{note}'
+    body = f'<div class="scroll" role="region" aria-label="{caption}"><table{sort}>{inside}</table></div>{_note(table)}'
     folded = f"<details><summary>{caption}</summary>{body}</details>"
     return folded if table.folded else f'<div class="table">{body}</div>'
 

@@ -176,11 +176,11 @@ def of_level(notes: Iterable[Note], level: Level) -> list[Note]:
     return [note for note in dict.fromkeys(notes) if note.level == level]
 
 
-def verdict(notes: Iterable[Note]) -> str:
-    """The first danger, else that there is none, with the numbers of what else there is to read."""
+def verdict(notes: Iterable[Note], further: int = 0) -> str:
+    """The first danger, else that there is none, with the number of warnings to read, ``further`` ones among them."""
     notes = condensed(notes)
-    dangers, warnings = of_level(notes, DANGER), of_level(notes, WARNING)
-    warned = f"{len(warnings)} warning{'s' if len(warnings) > 1 else ''}" if warnings else ""
+    dangers, warnings = of_level(notes, DANGER), len(of_level(notes, WARNING)) + further
+    warned = f"{warnings} warning{'s' if warnings > 1 else ''}" if warnings else ""
     if not dangers:
         return "; ".join(filter(None, ["No danger found", warned]))
     return dangers[0]

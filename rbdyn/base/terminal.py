@@ -5,11 +5,12 @@ import os
 import shutil
 import sys
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from textwrap import shorten, wrap
 from typing import NamedTuple
 
 from rbdyn.base.blocks import ALARMS, Block, Bullets, Detail, Heading, Paragraph, Remarks, Table, Verdict, has_content
-from rbdyn.base.notes import CODES, DANGER, NOTE, condensed, of_level
+from rbdyn.base.notes import CODES, DANGER, NOTE, WARNING, condensed, of_level
 from rbdyn.base.streams import escaped, styled
 from rbdyn.base.words import counted
 
@@ -35,32 +36,52 @@ def show(blocks: Iterable[Block], detail: Detail = Detail.USUAL) -> None:
 def text(blocks: Iterable[Block], detail: Detail = Detail.USUAL, width: int | None = None, bold: bool = False) -> str:
     """Text of the blocks up to a level of detail, each on lines of its own, without pictures.
 
-    The verdict comes first. Below full detail there are at most `MOST_NOTES` notes.
+    The verdict comes first. Warnings of remarks have numbers, with those of other blocks that they gather. Below full detail there are at most
+    `MOST_NOTES` warnings and notes, but every warning of the blocks.
 
     width : columns of the terminal; None for a file, whose sentences are one line each.
     bold : whether headings, captions and warnings are in bold type.
     """
     page = Page(width, bold)
     shown = [block for block in blocks if block.detail <= detail and has_content(block)]
+    alarms = [block for block in shown if isinstance(block, Paragraph) and block.role == "warning"]
+    if not any(isinstance(block, Remarks) and block.gathers for block in shown):
+        alarms = []
     written = ""
     for block in sorted(shown, key=lambda block: not isinstance(block, Verdict)):
+        if block in alarms:
+            continue
+        if isinstance(block, Verdict):
+            block = replace(block, warnings=len(alarms))
         titled = isinstance(block, Heading) or (isinstance(block, Table) and block.caption)
-        written += ("\n" if titled and written and not written.endswith("\n\n") else "") + (
-            _few_notes(block, page) if isinstance(block, Remarks) and detail < Detail.ALL else _render(block, page)
+        written += "\n" if titled and written and not written.endswith("\n\n") else ""
+        written += (
+            _remarks(block, [alarm.text for alarm in alarms], page, detail)
+            if isinstance(block, Remarks)
+            else _render(block, page)
         )
     return written
 
 
-def _few_notes(block: Remarks, page: "Page") -> str:
-    """The first notes, merged, without general ones, and where the others are; remarks that are no warnings are cut."""
-    every = condensed(block.listed)
-    room = max(MOST_NOTES - len(of_level(condensed(block.notes), DANGER)), 0)
-    first = [note for note in every if not CODES[note.code].general][:room]
-    lines = [f"{note.level}: {note}" for note in first]
-    short = [page.short(line) if note.level == NOTE else line for note, line in zip(first, lines, strict=True)]
-    left = len(every) - len(first)
+def _remarks(block: Remarks, alarms: Sequence[str], page: "Page", detail: Detail) -> str:
+    """The warnings with their numbers, those of other blocks first, then notes; below full detail merged, without general ones.
+
+    Remarks that are no warnings are then cut, and a line says where the others are.
+    """
+    every, first = condensed(block.listed), block.listed
+    if detail < Detail.ALL:
+        room = max(MOST_NOTES - len(of_level(condensed(block.notes), DANGER)) - len(alarms), 0)
+        first = [note for note in every if not CODES[note.code].general][:room]
+    warnings = [*alarms, *(note for note in first if note.level == WARNING)]
+    numbered = [f"warning: {text}" for text in warnings]
+    if len(warnings) > 1:
+        numbered = ["\nWarnings", *(f"{number}. {text}" for number, text in enumerate(warnings, 1))]
+    notes = [f"{note.level}: {note}" for note in first if note.level == NOTE]
+    if detail == Detail.ALL:
+        return "".join(map(page.lines, [*numbered, *notes]))
+    short, left = [page.short(line) for line in notes], len(every) - len(first)
     where = f"{counted(left, 'more note')} in the report (--out)" if left else "notes in full: in the report (--out)"
-    return "".join(map(page.lines, [*short, *([where] if left or short != lines else [])]))
+    return "".join(map(page.lines, [*numbered, *short, *([where] if left or short != notes else [])]))
 
 
 class Page(NamedTuple):
@@ -92,8 +113,6 @@ def _render(block: Block, page: Page) -> str:
             return page.title(f"{ALARMS[role]}: {text}") if role in ALARMS else page.lines(text)
         case Verdict(paragraphs=paragraphs):
             return "".join(_render(paragraph, page) for paragraph in paragraphs)
-        case Remarks(listed=listed):
-            return "".join(page.lines(f"{note.level}: {note}") for note in listed)
         case Heading(text):
             return page.title(text)
         case Bullets(items):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from datetime import date
 from functools import partial
@@ -26,7 +27,7 @@ from doe.workflow.pick import choices
 from doe.workflow.runs import _distinct_notes
 from doe.workflow.surfaces import predict_all
 from rbdyn.base import terminal
-from rbdyn.base.blocks import Detail, Paragraph
+from rbdyn.base.blocks import Detail, Paragraph, Table
 from rbdyn.base.notes import Note
 from rbdyn.base.records import plain
 from rbdyn.cli.app import app
@@ -73,7 +74,9 @@ def test_the_order_is_clearances_limits_gains_parts_reason_notes(width):
     text = terminal.text(blocks(Summary.from_dict(record)), width=width)
     places = [text.index(words) for words in ORDER]
     lines = text.splitlines()
-    assert lines[0] == "No danger found; 4 warnings" and lines[1].startswith("made-up bearing; 24000 rpm; 2026-01-31")
+    verdict = " ".join(lines[: 1 + (width < 80)])
+    assert verdict == "All 3 responses improve and every limit is kept. No danger found; 4 warnings"
+    assert lines[1 + (width < 80)].startswith("made-up bearing; 24000 rpm; 2026-01-31")
     assert places == sorted(places)
     assert "5 more notes in the report" in text and "published table" not in text
     # Four made-up warnings take up to three lines each.
@@ -91,8 +94,8 @@ def test_a_limit_has_its_odds_or_the_command_for_them():
         answer_text(Summary.from_dict(limited())),
         answer_text(Summary.from_dict(limited(odds=[0.57, 0.51, 0.63]))),
     )
-    assert unknown.count("doe study study.toml --robust states the probabilities over the unknown inputs.") == 1
-    assert answer_text(Summary.from_dict(summary())).count("--robust states the probabilities") == 1
+    assert unknown.count("Add --robust for probabilities over unknown inputs.") == 1
+    assert answer_text(Summary.from_dict(summary())).count("Add --robust for probabilities") == 1
     assert "57 (51 to 63)" in known and "kept over unknown inputs [%]" in known
 
 
@@ -119,7 +122,7 @@ def test_the_sentence_on_a_missed_limit_does_not_repeat_the_danger(verdict):
     assert (
         "at the selected design. " not in text and {"broken": "✗ broken", "undecided": "? undecided"}[verdict] in text
     )
-    assert "doe study study.toml --robust states the probabilities over the unknown inputs." in text
+    assert "Add --robust for probabilities over unknown inputs." in text
 
 
 @pytest.mark.parametrize(
@@ -265,3 +268,69 @@ def test_notes_of_runs_stand_in_the_order_of_their_mean_place():
         "dented by 5 MPa (in 1 of 3 runs)",
         "left out: 13 W (in 3 of 3 runs; values of the first)",
     ]
+
+
+def words(text: str) -> list[str]:
+    """Words and numbers of a text, without lone signs."""
+    return [word for word in text.split() if re.search(r"\w", word)]
+
+
+def prose(summary: Summary) -> str:
+    """The first screen of a study without its tables."""
+    return terminal.text([block for block in blocks(summary) if not isinstance(block, Table)])
+
+
+def test_the_verdict_comes_first_and_every_warning_has_a_number():
+    """Unit: gains and limits in the first line, warnings of blocks and of notes in one numbered list behind the answer; no sentence says
+    again what a table says, and at most 210 words are outside tables.
+    """
+    record = limited() | {"tolerances_warning": "Radial clearance requires parts finer than IT4. Try a wider design.",
+                          "whirl_sentence": "Do not choose by the whirl deviation ratio: the cage does not whirl."}  # fmt: skip
+    record["statement"] = "Simulated changes from the baseline: impact force: real."
+    record["notes"] = plain([Note("few-samples", "statistical error: uncertain"), Note("remark", "a remark")])
+    study = Summary.from_dict(record)
+    lines = answer_text(study).splitlines()
+    assert lines[0] == "All 3 responses improve and every limit is kept. No danger found; 3 warnings"
+    first = lines.index("Warnings")
+    assert [line.partition(". ")[0] for line in lines[first + 1 : first + 4]] == ["1", "2", "3"]
+    assert lines[first + 3] == "3. statistical error: uncertain" and lines[first + 4] == "note: a remark"
+    assert not any(line.lower().startswith("warning:") for line in lines)
+    said = prose(study)
+    assert record["statement"] not in said and "meets every limit" not in said
+    assert len(words(said)) <= 210
+    page = html_report(study)
+    assert record["statement"] in page and "meets every limit" in page
+    quiet = terminal.text(blocks(study), Detail.LEAST)
+    assert "Warning: Do not choose" in quiet and "Warnings" not in quiet
+
+
+@pytest.mark.parametrize(
+    ("percents", "said"),
+    [
+        ((11.0, 11.0, 11.0), "All 3 responses improve. "),
+        ((11.0, 11.0, 0.1), "Impact force and whirl deviation ratio improve, of 3 responses. "),
+        ((11.0, 0.1, 0.1), "Impact force improves, of 3 responses. "),
+        ((0.1, 0.1, 0.1), "No response improves by more than its error. "),
+    ],
+)
+def test_the_verdict_names_the_gains_that_are_real(percents, said):
+    """Unit: of fewer than three by name; it says so where no gain is real."""
+    record = summary()
+    for name, percent in zip(RESPONSES, percents, strict=True):
+        record["gains"][name] = record["gains"][name] | {"percent": percent}
+    text = answer_text(Summary.from_dict(record))
+    assert text.splitlines()[0] == f"{said}No danger found"
+
+
+@pytest.mark.slow
+def test_the_example_study_has_a_short_first_screen(tmp_path):
+    """Command line: the shipped study improves four responses with a held cage, in at most 210 words outside tables."""
+    import doe
+
+    answer = doe.study(ROOT / "examples" / "clearance_study.toml", tmp_path)
+    text, said = (tmp_path / "answer.txt").read_text("utf-8"), prose(answer.summary)
+    assert text.startswith("All 4 responses improve and every limit is kept. No danger found; ")
+    assert all(line in text for line in said.splitlines()) and len(words(said)) <= 210
+    assert {gain["verdict"] for gain in answer["gains"].values()} == {"better"}
+    assert answer["gains"]["pocket_impact_power_W"]["percent"] == pytest.approx(26.0, abs=2.0)
+    assert text.count("(held 16/16)") == 2

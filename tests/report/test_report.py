@@ -369,7 +369,7 @@ def test_the_odds_of_the_gains_follow_these():
     record = summary() | {"robust": robust.as_dict()}
     page = html_report(Summary.from_dict(record), motion())
     words = " ".join(Outline(page).words)
-    assert f'class="warning"><strong>Warning:</strong> {sentence}' in page and "--robust states" not in page
+    assert f'class="warning"><strong>Warning:</strong> {sentence}' in page and "Add --robust" not in page
     assert words.index("Changes confirmed") < words.index(sentence) < words.index("Over the unknown inputs")
     sure = record | {"robust": record["robust"] | {"all": [0.97, 0.94, 0.99]}}
     assert f'class="statement">{sentence}' in html_report(Summary.from_dict(sure))

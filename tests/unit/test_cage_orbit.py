@@ -157,8 +157,8 @@ def test_unit_study_says_whose_whirl_is_a_jitter(tmp_path, outer_result):
     both = {"baseline": point(0.016), "pick": point(0.02)}
     found = whirl_sentence(study, both)
     assert "does not whirl" in found
-    assert "0.016 of its clearance at the baseline and 0.02 of its clearance at the selected design" in found
-    assert whirl_sentence(study, both | {"pick": point(0.9)}).endswith("0.016 of its clearance at the baseline.")
+    assert found.endswith("(orbit over clearance: baseline 0.016, selected design 0.02).")
+    assert whirl_sentence(study, both | {"pick": point(0.9)}).endswith("(orbit over clearance: baseline 0.016).")
     assert whirl_sentence(study, dict.fromkeys(both, point(0.9))) == ""
     assert whirl_sentence(study, dict.fromkeys(both, point(None))) == ""
     assert whirl_sentence(idle, both) == ""

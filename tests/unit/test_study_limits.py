@@ -128,7 +128,7 @@ def test_a_broken_limit_warns_before_gains_and_fails_the_study_also_when_asked_a
     assert record["status"] == "broken"
     assert record["confirmation"]["baseline"]["limits"]["impact_force_N"]["verdict"] == "broken"
     answer = (tmp_path / "out" / "answer.txt").read_text(encoding="utf-8")
-    assert "Danger: Limit impact force" in answer and "doe study study.toml --robust" in answer
+    assert "Danger: Limit impact force" in answer and "Add --robust" in answer
     assert record["tried"] == 2
     page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
     assert "✗ broken" in page and ">limit<" in page

@@ -24,7 +24,8 @@ from doe.workflow.problem import Factor, Response
 from doe.workflow.tolerances import FactorTolerance
 from rbdyn.base.blocks import Block, Column, Detail, Figures, Paragraph, Role, Section, Sheet, Table, Widget
 from rbdyn.base.identity import identity_line
-from rbdyn.base.words import chance, label, quantity, range_ends, rounded_down, shown, with_error
+from rbdyn.base.notes import DANGER, of_level
+from rbdyn.base.words import chance, counted, label, quantity, range_ends, rounded_down, shown, with_error
 from rbdyn.clearances import CLEARANCES, other_ranges
 from rbdyn.result import TEMPERATURES
 
@@ -55,7 +56,7 @@ def first_screen(summary: Summary) -> list[Block]:
         identity_line(summary.identity),
         *_clearances(summary),
         *_judged(summary),
-        Paragraph(_cages(summary)),
+        Paragraph(_cages(summary), detail=Detail.ALL if _class_in_table(summary) else Detail.LEAST),
         *_gained(summary),
         *at_points(summary),
         *_parts_to_make(summary),
@@ -73,11 +74,8 @@ def _judged(summary: Summary) -> list[Block]:
     if min(odds, default=1.0) < NEARLY_ALL:
         return [table, Paragraph("The selected design does not meet every limit over the unknown inputs.", "warning")]
     everywhere = " and over the unknown inputs" if odds else ""
-    return [
-        table,
-        Paragraph(f"The selected design meets every limit{everywhere}.", "statement"),
-        _command_for_odds(summary),
-    ]
+    kept = Paragraph(f"The selected design meets every limit{everywhere}.", "statement", Detail.ALL)
+    return [table, kept, _command_for_odds(summary)]
 
 
 def _cages(summary: Summary) -> str:
@@ -90,18 +88,25 @@ def _cages(summary: Summary) -> str:
         return f"Cage: {'; '.join(f'{point}: {old} at the baseline, {new} at the selected design' for point, (old, new) in pairs.items())}."
     old, new = next(iter(pairs.values()))
     everywhere = ", at every point of the duty" if len(pairs) > 1 else ""
+    if old == new:
+        return f"Cage: {old} at baseline and selected design{everywhere}."
     return f"Cage: {old} at the baseline, {new} at the selected design{everywhere}."
 
 
+def _class_in_table(summary: Summary) -> bool:
+    """Whether the table of limits has the class of the cage, by a limit on it without a duty."""
+    return not summary.duty and any(name not in summary.asked.names for name in summary.limits)
+
+
 def _command_for_odds(summary: Summary) -> Paragraph:
-    """The command that states the odds, where these are unknown."""
-    command = f"doe study {summary.asked.study_file} --robust"
-    return Paragraph("" if summary.robust else f"{command} states the probabilities over the unknown inputs.")
+    """What states the odds, where these are unknown."""
+    return Paragraph("" if summary.robust else "Add --robust for probabilities over unknown inputs.")
 
 
 def _gained(summary: Summary) -> list[Block]:
     """The gains with their verdicts, and the odds of them over the unknown inputs or the command that computes these."""
     text, robust = summary.statement, summary.robust
+    role, bad = _role_of_gains(summary.gains, text), of_level(summary.notes, DANGER)
     sentences = robust.sentences if robust else []
     # Only the first two sentences are verdicts: the odds of the gains, and what decides.
     first: Role = "statement" if robust and robust.chances.all.value >= NEARLY_ALL else "warning"
@@ -109,12 +114,34 @@ def _gained(summary: Summary) -> list[Block]:
     further: list[Role] = [""] * len(sentences)
     return [
         _gains(summary),
-        Paragraph(text, _role_of_gains(summary.gains, text)),
+        # The verdict says so too, unless it names dangers.
+        Paragraph(text, role, Detail.USUAL if bad else Detail.ALL),
         *(Paragraph(sentence, role) for sentence, role in zip(sentences, [first, second, *further], strict=False)),
         _robust_points(summary),
         *([] if summary.limits else [_command_for_odds(summary)]),
         Paragraph(summary.whirl_sentence, "warning"),
     ]
+
+
+def good_news(summary: Summary) -> str:
+    """The gains that are real and the limits, before the words on dangers."""
+    count = len(summary.gains)
+    real = [name for name, gain in summary.gains.items() if gain.percent > gain.error_among(count)]
+    if not real:
+        return "No response improves by more than its error."
+    words = " and ".join(quantity(name)[0] for name in real) if len(real) < 3 else f"{len(real)} responses"
+    whole = (
+        f"All {count} responses improve"
+        if len(real) == count > 1
+        else f"{words[:1].upper()}{words[1:]} improve{'s' * (len(real) == 1)}"
+    )
+    rest = "" if len(real) == count else f", of {counted(count, 'response')}"
+    kept = (
+        " and every limit is kept"
+        if summary.limits and not (summary.obstacles.limits or summary.obstacles.cage)
+        else ""
+    )
+    return f"{whole}{rest}{kept}."
 
 
 def _role_of_gains(gains: Mapping[str, Gain], text: str) -> Role:
@@ -133,19 +160,20 @@ def _reasons(summary: Summary) -> list[Block]:
         Paragraph(search.sentences[0] if search else ""),
         *map(Paragraph, summary.rivals_sentences),
         Paragraph(search.held if search else ""),
-        Paragraph(_edge(summary.edge)),
+        _edge(summary.edge),
     ]
 
 
-def _edge(edge: Edge) -> str:
+def _edge(edge: Edge) -> Paragraph:
     """Where the pick lies in the region; the change beyond a bound is in the section of the confirmation."""
     bounds = [
         f"the {bound.side} bound of {name}, {shown(bound.bound)} {quantity(name)[1]}".rstrip()
         for name, bound in edge.factors.items()
     ]
     if bounds:
-        return f"The selected design is at {' and '.join(bounds)}: a wider design may find more."
-    return f"{edge.sentence.partition('; ')[0].rstrip('.')}."
+        return Paragraph(f"The selected design is near {' and '.join(bounds)}: try a wider region.", "warning")
+    inside = not edge.beyond_runs
+    return Paragraph(f"{edge.sentence.partition('; ')[0].rstrip('.')}.", detail=Detail.ALL if inside else Detail.LEAST)
 
 
 def _parts_to_make(summary: Summary) -> list[Block]:
@@ -178,14 +206,14 @@ def _clearances(summary: Summary) -> list[Block]:
     if meaning and summary.operating_clearances_mm:
         meaning += " Clearances in operation include the effects of fits, heat and rotation."
         meaning += least_words(summary)
-    widest = summary.tolerances_sentence
+    widest = SENTENCE_END.split(summary.tolerances_sentence or "")
     return [
-        _chosen(summary, inputs),
+        replace(_chosen(summary, inputs), note=meaning),
         Paragraph(summary.clearance_class),
-        Paragraph(meaning, "small"),
         *_temperatures(summary.confirmation),
         Paragraph("" if summary.obstacles.tolerances else summary.tolerances_warning or "", "warning"),
-        Paragraph(f"Tolerances: {' '.join(SENTENCE_END.split(widest)[:2])}" if widest else ""),
+        Paragraph(widest[0]),
+        Paragraph(" ".join(widest[1:2]), detail=Detail.ALL),
     ]
 
 
@@ -269,7 +297,8 @@ def _gains(summary: Summary) -> Table:
     rows = [(label(name), before[name].text, after[name].text, signed(gain)) for name, gain in summary.gains.items()]
     header = ("response", "baseline", "selected", "change")
     where = " over the duty" if summary.duty else ""
-    return Table(f"Changes{where} confirmed by simulation (95 % intervals)", header, rows, SIGNS_NOTE)
+    note = ", ".join(part for part in SIGNS_NOTE.rstrip(".").split(", ") if any(part[0] in row[-1] for row in rows))
+    return Table(f"Changes{where} confirmed by simulation (95 % intervals)", header, rows, f"{note}." if note else "")
 
 
 def limits(summary: Summary) -> Table:
@@ -285,17 +314,19 @@ def limits(summary: Summary) -> Table:
 
 def _limits_judged(summary: Summary) -> Table:
     """Every limit at the baseline and at the pick, and the odds that the pick keeps all those of a response."""
-    before, after = (summary.confirmation[name].every_limit for name in ("baseline", "pick"))
+    points = [summary.confirmation[name] for name in ("baseline", "pick")]
     rows = []
-    for limit, base in zip(after, before, strict=True):
-        odds = summary.limits[limit.response].odds
+    for base, limit in zip(*(point.every_limit for point in points), strict=True):
+        odds, classes = summary.limits[limit.response].odds, ["", ""]
+        if limit.response not in summary.asked.names and not summary.duty:
+            classes = [f" ({cage.cell})" for point in points for cage in (point.cage or {}).values()]
         rows.append(
             (
                 _bound(limit),
-                with_error(limit.value, limit.error),
+                f"{with_error(limit.value, limit.error)}{classes[1]}",
                 *_verdict(limit),
                 odds.of_hundred if odds else "",
-                f"{LIMITS[base.verdict][:1]} {with_error(base.value, base.error)}",
+                f"{LIMITS[base.verdict][:1]} {with_error(base.value, base.error)}{classes[0]}",
             )
         )
     shares = "kept over unknown inputs [%]"
