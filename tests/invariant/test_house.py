@@ -403,7 +403,10 @@ def test_invariant_hard_shapes_of_sentences_get_fewer():
 
 
 def test_invariant_the_citation_is_of_this_version():
-    """Invariant: CITATION.cff states version and licence of pyproject.toml."""
+    """Invariant: CITATION.cff states version and licence of pyproject.toml; the manual cites its title and version."""
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     lines = (ROOT / "CITATION.cff").read_text(encoding="utf-8").splitlines()
     assert {f"version: {project['version']}", f"license: {project['license']}"} <= set(lines)
+    title = next(line for line in lines if line.startswith("title: ")).removeprefix("title: ").strip('"')
+    page = (ROOT / "rbdyn" / "cli" / "manual" / "prose" / "73_references.md").read_text(encoding="utf-8")
+    assert f"{title}. Version {project['version']}." in page
