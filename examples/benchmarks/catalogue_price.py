@@ -4,12 +4,15 @@
 with ``traction.elasticity = false``, whose traction follows the steady law at once. Processor time of one thread; each way the
 example runs first and last, and its mean turn is the unit. Slip, loss, impact and whirl stand with the difference of both ways in units of
 their joint statistical error. ``--drawn N`` seeded scenes, ``--turns``, ``--replicates`` set the effort, ``--only`` picks named scenes.
+``--studies`` adds the processor time of the study that ``doe new`` writes for each, over that of the example's: minutes a bearing.
 """
 
 import argparse
 import math
+import resource
 import subprocess
 import sys
+import tempfile
 import tomllib
 from pathlib import Path
 
@@ -69,6 +72,23 @@ def simulated(data: dict[str, object], turns: float, replicates: int, *keys: str
     return simulate(Scene.from_dict(data, "scene", [*numbers, *keys]), workers=1)
 
 
+def study_s(scene: str) -> float:
+    """Processor time [s] of the study of a scene as ``doe new`` writes it, on one thread."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        (folder / "scene.toml").write_text(scene, encoding="utf-8")
+        new = ("new", str(folder / "scene.toml"), "--out", str(folder / "study.toml"))
+        study = ("study", str(folder / "study.toml"), "--out", str(folder / "out"), "--workers", "1", "--quiet")
+        subprocess.run([sys.executable, "-m", "doe", *new], check=True, capture_output=True)
+        before = resource.getrusage(resource.RUSAGE_CHILDREN)
+        # A study whose limits or parts are missed ends with another code.
+        subprocess.run([sys.executable, "-m", "doe", *study], capture_output=True)
+        after = resource.getrusage(resource.RUSAGE_CHILDREN)
+        if not (folder / "out" / "summary.json").exists():
+            return math.nan
+    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+
+
 def turn_ms(result: SimulationResult) -> float:
     """Processor time of a shaft turn [ms]."""
     return 1e3 * result.cost["cpu_s"] / result.cost["turns"]
@@ -88,11 +108,12 @@ def row_of(name: str, results: dict[str, SimulationResult], example_ms: float) -
     return [name, *prices, *evaluations, methods[1], *gaps, *apart]
 
 
-def main(turns: float, replicates: int, count: int, seed: int, only: str | None) -> None:
+def main(turns: float, replicates: int, count: int, seed: int, only: str | None, studies: bool) -> None:
     """Simulate and print the table."""
     example = tomllib.loads(EXAMPLE.read_text(encoding="utf-8"))
     unit = turn_ms(simulated(example, 4.0 * turns, replicates))
-    both = {}
+    both, prices = {}, dict[str, list[str]]()
+    study_unit = study_s(EXAMPLE.read_text(encoding="utf-8")) if studies else math.nan
     for name, words in (NAMED | drawn(count, seed)).items():
         if only is not None and only not in name:
             continue
@@ -100,11 +121,12 @@ def main(turns: float, replicates: int, count: int, seed: int, only: str | None)
             [sys.executable, "-m", "rbdyn", "new", *words], check=True, capture_output=True, text=True
         )
         data = tomllib.loads(made.stdout)
+        prices[name] = [f"{study_s(made.stdout) / study_unit:.1f}"] if studies else []
         both[name] = {way: simulated(data, turns, replicates, f"traction.elasticity={on}") for way, on in WAYS.items()}
     unit = 0.5 * (unit + turn_ms(simulated(example, 4.0 * turns, replicates)))
-    rows = [row_of(name, results, unit) for name, results in both.items()]
+    rows = [[*row_of(name, results, unit), *prices[name]] for name, results in both.items()]
     header = ["bearing", "turn over the example's: elastic", "steady", "right-hand sides a turn: elastic", "steady", "steady by",
-              "power gap %: elastic", "steady", "loss apart", "slip apart", "impact apart", "whirl apart"]  # fmt: skip
+              "power gap %: elastic", "steady", "loss apart", "slip apart", "impact apart", "whirl apart", *(["a study over the example's"] if studies else [])]  # fmt: skip
     for row in (header, ["---"] * len(header), *rows):
         print(f"| {' | '.join(row)} |")
     print(
@@ -119,5 +141,6 @@ if __name__ == "__main__":
     parser.add_argument("--drawn", type=int, default=10)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--only")
+    parser.add_argument("--studies", action="store_true")
     given = parser.parse_args()
-    main(given.turns, given.replicates, given.drawn, given.seed, given.only)
+    main(given.turns, given.replicates, given.drawn, given.seed, given.only, given.studies)

@@ -217,6 +217,7 @@ def test_unit_too_hot_and_seizure():
         ({"thermal.oil_ceiling_C": 15.0}, "thermal.oil_ceiling_C = 15: not above thermal.ambient_C = 20"),
         ({"thermal.housing_factor": 0.0, "thermal.shaft_factor": 0.0, "thermal.sump_factor": 0.0}, "thermal.housing_factor = 0 and thermal.shaft_factor = 0: leave"),
         ({"thermal.cage_offset_K": 5.0}, "thermal.cage_offset_K = 5: the model of ball bearings has no cage"),
+        ({"thermal.near": {"temperatures_C": [70.0] * 4, "slopes": [[0.0] * 4] * 4}}, "[thermal.near]: shortens simulations of rollers"),
         ({"thermal.cage_ceiling_C": 90.0}, "thermal.cage_ceiling_C = 90: the model of ball bearings has no cage"),
         ({"lubricant": None}, "lubricant: missing; [thermal] needs the oil"),
         ({"operation.inner_speed_rpm": 0.0}, "operation.inner_speed_rpm = 0: [thermal] needs rings that turn"),
