@@ -274,7 +274,8 @@ def read_toml(path: Path | str) -> dict[str, Any]:
     try:
         return _parsed(read_text(path), str(path))
     except tomllib.TOMLDecodeError as error:
-        raise InputError([f"{path}: not valid TOML ({error}); fix that line"]) from None
+        fix = "a key or table is there twice; remove one" if str(error).startswith("Cannot") else "fix that line"
+        raise InputError([f"{path}: not valid TOML ({error}); {fix}"]) from None
 
 
 def check_bounds(data: dict[str, Any], source: str) -> dict[str, Any]:

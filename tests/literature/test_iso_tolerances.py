@@ -93,8 +93,8 @@ def test_any_width_can_stand_at_the_position_of_a_letter(letter):
 @pytest.mark.parametrize(
     ("nominal", "code", "words"),
     [
-        (40, "q6", "is no tolerance class"),
-        (40, "h19", "is no tolerance class"),
+        (40, "q6", "is not a tolerance class"),
+        (40, "h19", "is not a tolerance class"),
         (501, "h6", "outside the tables of ISO 286"),
         (0, "h6", "outside the tables of ISO 286"),
         (40, "j9", "j has the grades 5, 6, 7"),
@@ -109,7 +109,7 @@ def test_unlisted_classes_are_refused(nominal, code, words):
 
 @pytest.mark.parametrize(
     ("nominal", "code", "words"),
-    [(27, "P3 bore", "is no ring class"), (27, "P5 raceway", "is no ring class"), (260, "P4 bore", "0 to 250 mm")],
+    [(27, "P3 bore", "is not a ring class"), (27, "P5 raceway", "is not a ring class"), (260, "P4 bore", "0 to 250 mm")],
 )
 def test_unlisted_ring_classes_are_refused(nominal, code, words):
     with pytest.raises(ValueError, match=words):

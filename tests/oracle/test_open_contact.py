@@ -159,7 +159,7 @@ def test_unit_notes_and_refusal(make_scene, outer):
     """Unit: below 1 % of C a note says what slip rests on; the films are no longer left out; no film without its law."""
     light = "operation.radial_load_N=50.0"
     (off,) = film_drive_notes(make_scene(light))
-    assert "set model.open_contact_film = true" in off
+    assert "Set model.open_contact_film = true" in off
     (on,) = film_drive_notes(make_scene(light, "model.open_contact_film=true"))
     assert "flooded" in on and "lubricant.inlet_distance" in on
     (fed,) = film_drive_notes(make_scene(light, "model.open_contact_film=true", "lubricant.inlet_distance=5.0"))
@@ -167,11 +167,11 @@ def test_unit_notes_and_refusal(make_scene, outer):
     (none,) = film_drive_notes(
         make_scene("operation.radial_load_N=0.0", "model.open_contact_film=true", "lubricant.inlet_distance=5.0")
     )
-    assert "are missing, for no loaded inner contact feeds them" in none
+    assert "are missing, because no loaded inner contact feeds them" in none
     assert film_drive_notes(outer) == ()
     assert any("oil films" in note for note in left_out_notes(outer, 20.0))
     assert not any("oil films" in note for note in left_out_notes(make_scene("model.open_contact_film=true"), 20.0))
-    assert any("times as much as the power loss" in note for note in left_out_notes(outer, 1e-3))
+    assert any("times the simulated loss" in note for note in left_out_notes(outer, 1e-3))
     with pytest.raises(InputError, match="open_contact_film = true contradict"):
         make_scene("model.open_contact_film=true", "model.rolling_resistance=off")
 

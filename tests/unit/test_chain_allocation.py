@@ -190,8 +190,8 @@ def test_limits_that_fixed_links_consume_come_with_the_nearest_that_can_be_met()
     [
         ({}, {"method": "cost"}, 'link "a": method = "cost" needs a curve'),
         ({"fit": "H7", "upper_mm": 0.1, "lower_mm": 0.0}, {}, 'fit = "H7": already sets the deviations'),
-        ({"fit": "Q7"}, {}, 'link "a": fit = "Q7": is no tolerance class'),
-        ({"fit": "P9 bore"}, {}, 'fit = "P9 bore": is no ring class'),
+        ({"fit": "Q7"}, {}, 'link "a": fit = "Q7": is not a tolerance class'),
+        ({"fit": "P9 bore"}, {}, 'fit = "P9 bore": is not a ring class'),
         ({"nominal_mm": 600.0}, {"grades": True}, "nominal_mm = 600: the grades here end at 500 mm"),
         ({"nominal_mm": 600.0, "position": "h"}, {}, 'position = "h": lies outside the tables'),
         ({"nominal_mm": None}, {}, 'link "a": nominal_mm: missing; add it'),

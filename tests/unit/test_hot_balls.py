@@ -219,7 +219,7 @@ def test_unit_too_hot_and_seizure():
         ({"thermal.cage_offset_K": 5.0}, "thermal.cage_offset_K = 5: the model of ball bearings has no cage"),
         ({"thermal.near": {"temperatures_C": [70.0] * 4, "slopes": [[0.0] * 4] * 4}}, "[thermal.near]: shortens simulations of rollers"),
         ({"thermal.cage_ceiling_C": 90.0}, "thermal.cage_ceiling_C = 90: the model of ball bearings has no cage"),
-        ({"lubricant": None}, "lubricant: missing; [thermal] needs the oil"),
+        ({"lubricant": None}, "lubricant: missing, but [thermal] needs its viscosity"),
         ({"operation.inner_speed_rpm": 0.0}, "operation.inner_speed_rpm = 0: [thermal] needs rings that turn"),
         ({"mounting.width_mm": 1.8}, "mounting.width_mm = 1.8: less than 11.906 mm of its rolling elements"),
         ({"thermal.ambient_C": 293.15}, "thermal.ambient_C = 293.15: not below 120, the usual ceiling of ISO VG 32; if 293.15 K"),
