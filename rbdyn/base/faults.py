@@ -29,6 +29,8 @@ from pydantic import (
     model_validator,
 )
 
+from rbdyn.base.words import quantity
+
 
 def _not_vanishing(value: float) -> float:
     if value < SMALLEST:
@@ -93,6 +95,8 @@ Model = TypeVar("Model", bound=BaseModel)
 
 # Most faults in one message, and most characters of a sentence and of a name in it: about a screen.
 MOST_FAULTS, LONGEST_SENTENCE, LONGEST_NAME = 50, 1000, 60
+# Faults of a number that its unit may explain.
+BOUNDED = {"greater_than", "greater_than_equal", "less_than", "less_than_equal"}
 # Least similarity (0 to 1) of a suggested key to the unknown one, and the bonus of a missing key.
 LEAST_LIKENESS, MISSING_FIRST = 0.6, 0.1
 # Most bytes of a file and deepest nesting of its tables: far above any real input, yet read in seconds.
@@ -443,7 +447,7 @@ def _without(data: Any, bad: set[tuple[int | str, ...]], place: tuple[str, ...] 
 
 def _sentences(model: type[BaseModel], errors: Sequence[Any], data: Any, source: str) -> list[str]:
     sentences: list[str] = []
-    fixes: dict[str, list[str]] = {}
+    fixes, units = dict[str, list[str]](), dict[str, str]()
     missing = {_place(fault, data) for fault in errors if fault["type"] == "missing"}
     for fault in errors:
         kind, value, place = fault["type"], fault["input"], _place(fault, data)
@@ -468,8 +472,10 @@ def _sentences(model: type[BaseModel], errors: Sequence[Any], data: Any, source:
         elif isinstance(value, float) and not math.isfinite(value):
             sentences.append(f"{source}: {key} = {value}: is not a finite number; write a plain number")
         else:
-            fixes.setdefault(f"{source}: {key} = {_toml(value)}", []).append(_fix(kind, fault))
-    return sentences + [f"{head}: {', or '.join(dict.fromkeys(fix))}" for head, fix in fixes.items()]
+            head = f"{source}: {key} = {_toml(value)}"
+            fixes.setdefault(head, []).append(_fix(kind, fault))
+            units[head] = f"; check its unit, {unit}" if kind in BOUNDED and (unit := quantity(key)[1]) else ""
+    return sentences + [f"{head}: {', or '.join(dict.fromkeys(fix))}{units[head]}" for head, fix in fixes.items()]
 
 
 def _place(fault: Any, data: Any) -> tuple[int | str, ...]:

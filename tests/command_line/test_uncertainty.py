@@ -111,7 +111,7 @@ def test_record_files_and_resumption(tmp_path: Path, monkeypatch: pytest.MonkeyP
         ('[uncertain]\n"cage.masss_g" = {law = "uniform", low = 1.0, high = 2.0}\n', "masss_g: unknown key"),
         (
             '[uncertain]\n"cage.mass_g" = {law = "uniform", low = -2.0, high = -1.0}\n',
-            'uncertain."cage.mass_g" at -1.999: cage.mass_g = -1.999: must be at least 0.01; change its law',
+            'uncertain."cage.mass_g" at -1.999: cage.mass_g = -1.999: must be at least 0.01; check its unit, g; change its law',
         ),
         ('[uncertain]\n"cage.guidance" = {law = "choices", values = ["outer", "top"]}\n', "change its law"),
         ("[uncertain]\npoints = 100\n", "points = 100: no power of two; take 64"),

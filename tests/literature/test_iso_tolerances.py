@@ -109,7 +109,11 @@ def test_unlisted_classes_are_refused(nominal, code, words):
 
 @pytest.mark.parametrize(
     ("nominal", "code", "words"),
-    [(27, "P3 bore", "is not a ring class"), (27, "P5 raceway", "is not a ring class"), (260, "P4 bore", "0 to 250 mm")],
+    [
+        (27, "P3 bore", "is not a ring class"),
+        (27, "P5 raceway", "is not a ring class"),
+        (260, "P4 bore", "0 to 250 mm"),
+    ],
 )
 def test_unlisted_ring_classes_are_refused(nominal, code, words):
     with pytest.raises(ValueError, match=words):

@@ -89,7 +89,7 @@ def test_unit_a_key_of_uncertain_has_one_say(uncertain: dict[str, Any], sentence
         (_relative("cage.mass_g", "cage.mass_g.real"), "the scene has no number there"),
         (
             {**_relative("cage.mass_g", STIFFNESS), STIFFNESS: {"law": "choices", "values": ["rigid", 5e7]}},
-            "the values of that key are no numbers",
+            "the values of that key are not numbers",
         ),
         (
             {

@@ -255,7 +255,7 @@ def test_unit_a_changed_scene_is_that_of_a_changed_file():
     ("changes", "words"),
     [
         ({"cage.mass_gg": 50.0}, "changed scene: cage.mass_gg: unknown key; did you mean mass_g?"),
-        ({"cage.mass_g": -1.0}, "changed scene: cage.mass_g = -1.0: must be at least 0.01"),
+        ({"cage.mass_g": -1.0}, "changed scene: cage.mass_g = -1.0: must be at least 0.01; check its unit, g"),
         ({"cage.mass_g.x": 1.0}, "changed 'cage.mass_g.x': mass_g is a value, not a table; check the key path"),
         ({"cage..x": 1.0}, "changed 'cage..x': write it as key.path=value"),
     ],
