@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from short_studies import with_paper_goals
 from typer.testing import CliRunner
 
 from doe.cli import app
@@ -207,7 +208,7 @@ def study(folder: Path, *changes: tuple[str, str]) -> Path:
     """The example study in a folder of its own, changed."""
     for name in ("cylindrical_roller.toml", "ccd_table4.csv", "bearing_chains.toml"):
         shutil.copy(EXAMPLES / name, folder)
-    text = (EXAMPLES / "clearance_study.toml").read_text(encoding="utf-8")
+    text = with_paper_goals((EXAMPLES / "clearance_study.toml").read_text(encoding="utf-8"))
     for old, new in changes:
         assert old in text
         text = text.replace(old, new, 1)

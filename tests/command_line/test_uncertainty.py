@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from instant_runs import instant_result
+from short_studies import with_paper_goals
 from typer.testing import CliRunner
 
 from doe.cli import app
@@ -254,7 +255,7 @@ class _Simulations:
 
 
 def _study(folder: Path, uncertain: str, settle: float = 0.5, front: str = "none") -> Problem:
-    text = (EXAMPLES / "clearance_study.toml").read_text("utf-8")
+    text = with_paper_goals((EXAMPLES / "clearance_study.toml").read_text("utf-8"))
     (folder / "cylindrical_roller.toml").write_text((EXAMPLES / "cylindrical_roller.toml").read_text("utf-8"), "utf-8")
     for each in EXAMPLES.glob("*.csv"):
         (folder / each.name).write_bytes(each.read_bytes())
