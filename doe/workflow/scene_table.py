@@ -158,7 +158,7 @@ def dotted_keys() -> list[str]:
     """All keys of a scene of rollers, with their tables, that a cell can state: those of a value."""
     from rbdyn.scene.keys import keys
 
-    return [key.key for key in keys({"scene": Scene}) if "[]" not in key.key and not key.values.startswith("a list")]
+    return [key.key for key in keys({"scene": Scene}) if "[]" not in key.key and not key.values.startswith("list")]
 
 
 def _rows(sheet: InputTable, keys: Mapping[str, str]) -> Iterator[SceneRow]:
