@@ -52,8 +52,8 @@ class Near(Strict):
     temperatures_C: Annotated[list[OilCelsius], Field(min_length=4, max_length=4)]  # noqa: N815
     """Temperatures of oil, outer ring, inner ring and rollers, as a result has them."""
     slopes: Annotated[list[Slopes], Field(min_length=4, max_length=4)]
-    """Change of each temperature that the network computes, one row each, by one kelvin more of each temperature assumed:
-    "slopes" under "thermal" of a result."""
+    """Change of each computed temperature by one kelvin more of each assumed one. Each row belongs to a computed temperature.
+    A result has them as "slopes" under "thermal"."""
 
 
 class Thermal(Sparse):

@@ -210,4 +210,4 @@ def test_command_line_prints_notes_of_points_unless_quiet():
         "Danger: outer raceway: dented by"
     )
     assert " (2 points, the first at operation.axial_load_N = 20000)" in loud
-    assert "warning: " in loud and "warning: " not in quiet and "note" not in quiet
+    assert "\nWarnings\n" in loud and "arning" not in quiet and "note" not in quiet

@@ -50,7 +50,7 @@ def test_simulate_states_temperatures_and_their_origin(command, scene, tmp_path)
         "temperature [°C]",
         "inputs (90 %)",
         "inner ring and shaft",
-        "steady state; gain of heat",
+        "steady state; thermal loop gain",
         "removed: oil flow",
     ):
         assert words in done.stdout

@@ -7,7 +7,7 @@ import pytest
 
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.integrators import runge_kutta as rk
-from rbdyn.dynamics.integrators.advance import ACCEPTED, FINISHED, advance
+from rbdyn.dynamics.integrators.advance import ACCEPTED, FINISHED, steps_to
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.run import Run
 
@@ -78,7 +78,7 @@ def test_invariant_frame_changes_no_solution(outer, monkeypatch):
         monkeypatch.setattr(rk, "begin_step", begin_step)
         run = Run(outer, roller_bearing(outer), 0, 1e-9, Stop())
         t_end = 0.02 * outer.turn_s
-        status = advance.py_func(run.bearing, run.control, run.carry, run.tally, t_end, 1.0)
+        status = steps_to.py_func(run.bearing, run.control, run.carry, run.tally, t_end, 1.0)
         assert status == FINISHED
         ends.append(run.carry.y.copy())
         steps.append(run.carry.counts[ACCEPTED])

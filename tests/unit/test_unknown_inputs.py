@@ -270,7 +270,7 @@ def test_unknown_inputs_are_no_part_of_a_run() -> None:
         ),
         (
             {"model.drag": {"law": "choices", "values": ["off", "cylinder"], "times": "cage.mass_g"}},
-            "no numbers to multiply",
+            "are not numbers and cannot be multiplied",
         ),
         ({"points": 100}, "points = 100: no power of two; take 64"),
         ({"cage.mass_g": 3.0}, "cage.mass_g = 3.0: must be a table of keys"),

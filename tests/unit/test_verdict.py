@@ -63,7 +63,9 @@ def test_replicates_alike_name_a_class_from_six(replicates, share, name):
     assert verdict(class_shares(["held"] * (replicates - 1) + ["circling"]), Thresholds()) == "undecided"
 
 
-@pytest.mark.parametrize(("samples", "play", "fault"), [(640, 0.0, "play above 0"), (63, PLAY, "at least a cage turn")])
+@pytest.mark.parametrize(
+    ("samples", "play", "fault"), [(640, 0.0, "a clearance above 0"), (63, PLAY, "at least a cage turn")]
+)
 def test_an_orbit_that_cannot_be_judged_is_refused(samples, play, fault):
     with pytest.raises(ValueError, match=fault):
         orbit_measures(np.ones(samples, complex), play)
