@@ -31,11 +31,7 @@ from rbdyn.verdict.replicates import CageVerdict
 EVERYWHERE = ""
 WHIRL = "whirl_deviation_ratio"
 # Verdicts on gains: the first is good news, the others are not.
-REAL, LOSS, NOISE = (
-    "real, more than its error",
-    "a real loss, more than its error",
-    "inside its own noise: no gain is shown",
-)
+REAL, LOSS, NOISE = ("real, more than its error", "a real loss, more than its error", "not significant")
 
 Verdict = Literal["kept", "undecided", "broken"]
 # From the best to the worst.

@@ -452,7 +452,7 @@ def _reason(forecast: Forecast, rival: Confirmed, pick: Confirmed) -> str:
             return f"but {forecast.source} a broken limit{where}"
         if (worse := here.costs > there.costs).any():
             return f"but{where} {forecast.source} {_losses(study, here.costs, there.costs, worse, pick)} than at the selected design"
-    return "and nothing that the study knows speaks against it: consider it"
+    return "and the study found no reason to reject it: consider it"
 
 
 def _losses(study: Problem, costs: Array, pick_costs: Array, worse: Mask, pick: Confirmed) -> str:

@@ -389,7 +389,7 @@ def study(
     return reported(
         "methods",
         (agreement_table(references), table(attempts, turns), ratio_table(ratios)),
-        (*sentences, f"{compile_s:.1f} s to load or compile, in none of the times"),
+        (*sentences, f"{compile_s:.1f} s to load or compile (excluded from the times)"),
         written,
         lambda path: _draw(attempts, references.floor(turns), turns, path),
         rows=written,

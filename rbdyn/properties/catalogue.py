@@ -408,7 +408,7 @@ def ball_interior(sizes: Envelope, named: Designation) -> BallInterior:
     suffix = named.value_of("angle")
     lead = suffix or ("B" if usual else "C")
     filling = GENERAL_FILLING if usual else SPINDLE_FILLING
-    many = f"estimated: {filling:g} of a full circle, {'+-1' if usual else '+-2, and fewer where it is made for speed'}"
+    many = f"estimated: {filling:g} of a full circle, {'+-1' if usual else '+-2; fewer in high-speed designs'}"
     turned = f"of suffix {lead}" if suffix else f"no suffix given; usual ({lead})"
     return BallInterior(round(filling * 2.0 * math.pi / apart), diameter, pitch, ANGLES[lead], many, by, turned)
 

@@ -220,7 +220,7 @@ def test_a_better_point_that_speaks_for_itself_is_recommended(predicted):
         at=lambda point: SimpleNamespace(costs=np.zeros(3), keeps=True),
     )  # fmt: skip
     (sentence,) = rivals_sentences(forecast, simulated(study, surfaces, swapped, {name: 0.1}))
-    assert sentence.endswith("nothing that the study knows speaks against it: consider it.")
+    assert sentence.endswith("the study found no reason to reject it: consider it.")
     forecast.at, forecast.searched = (lambda point: None), SimpleNamespace(name="adaptive")
     (sentence,) = rivals_sentences(forecast, simulated(study, surfaces, swapped, {name: 0.1}))
     assert "not a point of the adaptive front, from which the design is selected" in sentence

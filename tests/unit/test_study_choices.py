@@ -34,7 +34,7 @@ def simulations(store: Store, retry: bool = False) -> Simulations:
 def test_gains_are_real_only_beyond_their_joint_error():
     """Closed form: for two responses the joint intervals are 2.2414 / 1.9600 times as wide."""
     text = statement({"force": Gain(9.0, 8.0), "loss": Gain(3.0, 1.0)})
-    assert "force: inside its own noise: no gain is shown" in text
+    assert "force: not significant" in text
     assert "loss: real, more than its error" in text
     assert "a real loss" in statement({"force": Gain(-9.0, 2.0)})
 

@@ -108,7 +108,7 @@ def _evaluation(evaluation: Evaluation) -> list[Block]:
     }
     what = "Scaled prediction variance: least, mean and largest by radius"
     return [
-        record_table("How good the design is for the models asked", single),
+        record_table("Design quality for the chosen models", single),
         power_sheet(evaluation, BY_TERM).block,
         Figures(
             [still.svg for still in evaluation_plots(evaluation)],
