@@ -4,6 +4,7 @@ Both designs are simulated at the same input sets. Sets with a doubtful gain get
 until the further runs that the study allows are spent. The robust front holds points by their gains over the inputs.
 """
 
+import math
 from collections.abc import Mapping, Sequence
 from copy import deepcopy
 from dataclasses import dataclass, replace
@@ -38,7 +39,7 @@ from doe.workflow.judgement import ConfirmedGain, Decider, Decision, GainPoint, 
 from doe.workflow.problem import Problem
 from rbdyn.base.arrays import Array, Whole, one_thread
 from rbdyn.base.estimate import wilson
-from rbdyn.base.faults import InputError, refuse, set_key
+from rbdyn.base.faults import InputError, key_path, refuse, set_key
 from rbdyn.scene.unknown import Input, UnknownInput, is_number
 from rbdyn.verdict.orbits import BLOCK_TURNS
 
@@ -405,14 +406,19 @@ def case_of_study(study: Problem) -> Case:
     if duty is not None:
         case = replace(case, outputs=tuple(duty.columns), duty=duty)
         refuse(impossible(case))
-    classes, turns = study.file.limits.classes, case.scene_of_sets.cage_turns
-    if classes and turns < BLOCK_TURNS:
-        raise InputError(
-            [
-                f"{case.home}: uncertain.set: input sets of {turns:.3g} cage turns are shorter than the {BLOCK_TURNS} that limits.cage.verdict "
-                "needs; set numerics.turns there to more"
-            ]
-        )
+    classes, sets, declared_runs = study.file.limits.classes, case.scene_of_sets, case.uncertain
+    if classes and sets.cage_turns < BLOCK_TURNS:
+        others = [text for text in declared_runs.set if key_path(text) != ("numerics", "turns")]
+        if "set" in declared_runs.model_fields_set and len(others) < len(declared_runs.set):
+            raise InputError(
+                [
+                    f"{case.home}: uncertain.set: input sets of {sets.cage_turns:.3g} cage turns are shorter than the {BLOCK_TURNS} that "
+                    "limits.cage.verdict needs; set numerics.turns there to more"
+                ]
+            )
+        turns = math.ceil(sets.numerics.turns * BLOCK_TURNS / sets.cage_turns)
+        longer = declared_runs.model_copy(update={"set": [*others, f"numerics.turns={turns}"]})
+        case = replace(case, uncertain=longer)
     return replace(case, classes=classes)
 
 

@@ -169,7 +169,8 @@ class Uncertain(Strict):
     most this number."""
     set: list[str] = list(RUNS)
     """Keys that differ from the scene file in the runs of input sets, as key=value. Your list replaces these keys and keeps
-    the other defaults. A key in this list is fixed: it has no distribution and no documented range."""
+    the other defaults. A key in this list is fixed: it has no distribution and no documented range. A study with a limit on
+    the class of the cage lengthens its default of 20 shaft turns to 10 turns of the cage."""
     sample: str | None = None
     """CSV file of a posterior sample, one row per input set, with keys as columns. It replaces the distributions of these
     keys. The path is relative to the folder of this file."""

@@ -13,6 +13,7 @@ from short_studies import short_study
 from typer.testing import CliRunner
 
 from doe.cli import app
+from doe.study_file.sections import CageLimit
 from doe.workflow.confirmation import Confirmed, class_limits, limits_of
 from doe.workflow.problem import Problem
 from doe.workflow.robust import case_of_study
@@ -191,6 +192,16 @@ def test_input_sets_too_short_for_a_class_are_refused(tmp_path):
     path.write_text(path.read_text(encoding="utf-8") + UNKNOWN.format(turns=20), encoding="utf-8")
     with pytest.raises(InputError, match=r"uncertain\.set: input sets of 7\.\d+ cage turns are shorter than the 10"):
         case_of_study(Problem.load(path))
+
+
+def test_input_sets_are_as_long_as_a_class_needs(tmp_path):
+    """The study's own default of 20 shaft turns gives way to a limit on the class; it stays without one."""
+    study = Problem.load(limited(tmp_path, "held"))
+    assert 10.0 <= case_of_study(study).scene_of_sets.cage_turns < 10.5
+    free = Problem(
+        study.path, study.file.model_copy(update={"limits": study.file.limits.model_copy(update={"cage": CageLimit()})})
+    )
+    assert case_of_study(free).scene_of_sets.numerics.turns == 20
 
 
 @pytest.mark.parametrize("by", ["design", "pick"])
