@@ -178,6 +178,7 @@ class Recording:
             group=group_of(run.scene, run.replicate),
             cage_path=np.array(self._path, dtype=float).view(complex),
             traced=np.array(self._traced),
+            end=run.carry.y.copy(),
         )
 
     def _go(self, end: float) -> None:
@@ -302,8 +303,7 @@ class Ensemble:
     """Replicates and companions as they are counted, and the ``plan`` by which companions are integrated.
 
     ``since``: batch from which they would count if they had settled at once; ``fault``: why companions that were asked for are missing;
-    ``transient_turns``: shaft turns of the transient, None where it is unknown; ``notes``: on the length of the runs. ``ends``: last
-    states of the replicates.
+    ``transient_turns``: shaft turns of the transient, None where it is unknown; ``notes``: on the length of the runs.
     """
 
     runs: list[Replicate]
@@ -313,7 +313,11 @@ class Ensemble:
     fault: str | None
     transient_turns: float | None
     notes: Notes
-    ends: Sequence[Array] = ()
+
+    @property
+    def ends(self) -> list[Array]:
+        """Last states of the replicates."""
+        return [run.end for run in self.runs]
 
 
 # Factor by which a run that has not settled gets longer.

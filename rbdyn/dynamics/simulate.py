@@ -2,7 +2,6 @@
 
 import time
 from collections.abc import Iterable, Sequence
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -30,11 +29,11 @@ from rbdyn.dynamics.parameters.validity import (
     slip_notes,
 )
 from rbdyn.dynamics.part_figures import part_figures, races_of
-from rbdyn.dynamics.recording import Ensemble, Recording, recording_of, run_until_settled, whole_windows
+from rbdyn.dynamics.recording import Ensemble, recording_of, run_until_settled, whole_windows
 from rbdyn.dynamics.run import explicit_method, prepare, stiffness_cost, stiffness_notes
 from rbdyn.dynamics.statistics.error_bars import error_notes, quantities
 from rbdyn.dynamics.statistics.extremes import return_force_notes
-from rbdyn.dynamics.statistics.metrics import TIGHT, Companions, whirl_notes, work_done
+from rbdyn.dynamics.statistics.metrics import TIGHT, whirl_notes, work_done
 from rbdyn.losses import POWER_TERMS
 from rbdyn.mounting.cage import OperatingClearance
 from rbdyn.result import SimulationResult
@@ -140,22 +139,11 @@ def _ensemble(
     started, compiled_s = time.perf_counter(), COMPILING.seconds
     # A replicate that fails stops those of its own scene alone.
     own = Stop(outer=stop)
-    recordings = dict[int, Recording]()
-
-    def begin(replicate: int, companions: Companions | None, stop: Stop) -> Recording:
-        recording = recording_of(scene, bearing, pace, replicate, companions, stop, starts)
-        if companions is None:
-            recordings[replicate] = recording
-        return recording
-
+    begin = partial(recording_of, scene, bearing, pace, starts=starts)
     ensemble = run_until_settled(scene, begin, workers, progress, own, pace)
-    ends = [recordings[place].run.carry.y.copy() for place in range(len(ensemble.runs))]
     # A method that a run tries, and this run first, is compiled then.
     more_s = COMPILING.seconds - compiled_s
-    return replace(ensemble, ends=ends), {
-        "wall_s": time.perf_counter() - started - more_s,
-        "compile_s": compile_s + more_s,
-    }
+    return ensemble, {"wall_s": time.perf_counter() - started - more_s, "compile_s": compile_s + more_s}
 
 
 def _gather(scene: Scene, ensemble: Ensemble, clock: dict[str, float]) -> SimulationResult:

@@ -30,6 +30,7 @@ class Replicate:
     - ``group``: of its start, as in ``parameters.state``
     - ``cage_path``: of the cage's centre about its guide [m], complex, evenly in time; empty where it was not traced
     - ``traced``: samples of it in each batch, and those with a loaded contact of the inner race
+    - ``end``: its last state, from which it can go on
     """
 
     first: int
@@ -55,6 +56,7 @@ class Replicate:
     group: int = 0
     cage_path: Complex = field(default_factory=lambda: np.zeros(0, complex))
     traced: Array = field(default_factory=lambda: np.zeros((0, 2)))
+    end: Array = field(default_factory=lambda: np.zeros(0))
 
     def counted_from(self, first: int) -> "Replicate":
         """The same run, counted from another batch."""
