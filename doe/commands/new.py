@@ -46,7 +46,7 @@ centre = {centre} # {source}
 step = {step:.6g} # {width}
 resolution = 0.001 # of the drawing
 """
-BASELINE = """[baseline] # the original design, over which gains count
+BASELINE = """[baseline] # the design over which improvements count
 {values}
 """
 TOLERANCE = """tolerance = {half_width:.6g} # half width: {rule}

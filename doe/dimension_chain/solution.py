@@ -296,7 +296,7 @@ def _judged(search: Allocation, samples: int, seed: int) -> _Judged:
     elif chain.is_stated and _fits(search, parts, assemblies.yields["as_given"]):
         status = "ok"
     elif matched is not None and keeps_limits(chain, matched):
-        status = f"{MATCHED} {matched.classes} classes; random assemblies miss the limits"
+        status = f"{MATCHED} {matched.classes} classes; random assemblies violate the limits"
     return _Judged(parts, assemblies, matched, status)
 
 

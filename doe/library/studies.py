@@ -139,12 +139,14 @@ class StudyAnswer(Answer):
         ]
 
     def brief(self) -> str:
+        from doe.report.sections.record import LIMITS
+
         changes = [
             f"{quantity(name)[0]} {improvement(gain.percent, gain.error_percent, gain.goal)}"
             for name, gain in self.summary.gains.items()
         ]
         judged = self.summary.confirmation["pick"].every_limit
-        limits = [f"{limit.bound_words} {limit.verdict}" for limit in judged]
+        limits = [f"{limit.bound_words} {LIMITS[limit.verdict]}" for limit in judged]
         return ", ".join([*changes, *limits])
 
 

@@ -55,7 +55,7 @@ def tables() -> dict[str, list[Sheet[Any]]]:
         reference_sheet(factors, responses),
     ]
     deciders = Sheet(
-        "", DECIDERS, file="decides.csv", content="The inputs that decide between the selected design and the original."
+        "", DECIDERS, file="decides.csv", content="The inputs that decide between the selected design and the baseline."
     )
     unknown = [
         set_sheet(["{key}"], responses),

@@ -227,7 +227,7 @@ class InfeasibleError(MethodError):
 
     def __init__(self, point: Array, violations: Array) -> None:
         self.point, self.violations = point, violations
-        super().__init__("no point keeps all limits; loosen one")
+        super().__init__("no point meets all limits; loosen one")
 
 
 class Search(NamedTuple):

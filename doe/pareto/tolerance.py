@@ -78,7 +78,7 @@ def widest_tolerances(
     distribution: Distribution = "normal",
     samples: int = 4096,
     seed: int = 1,
-    promise: str = "keep all limits",
+    promise: str = "meet all limits",
     count_on_draws: PartCount | None = None,
     open_errors: str = "",
 ) -> WidestTolerances:
@@ -280,9 +280,9 @@ def pick_among(
     """
     broken = violations.sum(axis=1)
     rows = np.flatnonzero(broken <= 0.0)
-    limits = " and keep their limits" if violations.shape[1] else ""
+    limits = " and meet their limits" if violations.shape[1] else ""
     if not rows.size:
-        rows, limits = np.array([int(broken.argmin())]), ", none of which keeps all limits"
+        rows, limits = np.array([int(broken.argmin())]), ", none of which meets all limits"
     rows = rows[non_dominated(costs[rows])]
     against = next((baseline for baseline in baselines if dominates(costs[rows], baseline).any()), None)
     if against is None and baselines:

@@ -268,7 +268,7 @@ def confirmation_sheet(
         Column(
             "limit",
             at=lambda row: f"{row['judged'].sense} {row['judged'].bound:g}" if row["judged"] else "",
-            meaning="the limit, and kept, broken or undecided",
+            meaning="the limit, and kept (met), broken (violated) or undecided",
         ),
         Column("limit_verdict", at=lambda row: row["judged"].verdict if row["judged"] else ""),
     )

@@ -40,9 +40,11 @@ ORDER: tuple[Verdict, ...] = ("kept", "undecided", "broken")
 
 def point_words(name: str) -> str:
     """The name of a confirmed point as people read it."""
-    return {"pick": "selected design", "without_tolerances": "pick without tolerances"}.get(
-        name, name.replace("_", " ")
-    )
+    return {
+        "pick": "selected design",
+        "without_tolerances": "design selected without tolerances",
+        "pick_of_surfaces": "design selected on the surfaces",
+    }.get(name, name.replace("_", " "))
 
 
 @dataclass(frozen=True)
@@ -147,8 +149,8 @@ def simulate_original(study: Problem, simulations: Simulations) -> Confirmed:
     run = study.confirmation_run(study.baseline)
     (result,) = simulations.run([run], ["baseline"], simulations.progress("baseline"))
     if isinstance(result, Failure):
-        raise RunError(f"the original design cannot be simulated: {result}")
-    return confirmed_from(study, Choice(study.baseline, "the original design"), result)
+        raise RunError(f"the baseline design cannot be simulated: {result}")
+    return confirmed_from(study, Choice(study.baseline, "the baseline design"), result)
 
 
 @one_thread

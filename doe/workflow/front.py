@@ -37,7 +37,7 @@ from rbdyn.base.faults import InputError, MethodError
 # Shares of the back-off from limits: the search takes the largest that any point keeps.
 SHARES = (1.0, 0.5, 0.25, 0.0)
 # Why a point is the pick that no other comes nearer to the limits than.
-CLOSEST = "the point of the region that is expected to miss the limits least"
+CLOSEST = "the point of the region that is expected to violate the limits least"
 # Keys of [front] that are arguments of the searches.
 SEARCH = {"population", "generations", "seed", "pick"}
 AnyFront = TypeVar("AnyFront", "ParetoFront", "ToleranceAware")
@@ -179,7 +179,7 @@ def out_of_reach(study: Problem, point: Array, violations: Array, suffix: str = 
     return OutOfReachError(
         [
             f"{study.path}: response.lower, response.upper: no point of the region meets all limits{suffix}. The closest "
-            f"({position}) misses {excess}; loosen a limit or widen the design"
+            f"({position}) violates {excess}; loosen a limit or widen the design"
         ]
     )
 
@@ -187,7 +187,7 @@ def out_of_reach(study: Problem, point: Array, violations: Array, suffix: str = 
 def tolerances_out_of_reach(study: Problem, violations: Array) -> str:
     """That no point keeps all limits within the factors' own tolerances; the closest exceeds them by ``violations`` (c,)."""
     return (
-        "No point keeps all limits at the ends of the factors' own tolerances: the closest misses "
+        "No point meets all limits at the ends of the factors' own tolerances: the closest violates "
         f"{excess_words(study, violations)}."
     )
 

@@ -170,7 +170,7 @@ def _flip(best: Decider) -> str:
         return " The value at which it changes the choice is too uncertain to state."
     unit, side = quantity(best.key)[1], "Below" if best.pick_above else "Above"
     low, high = (shown(float(end), 3) for end in best.flip_interval)
-    return f" {side} {shown(best.flip, 3)} ({low} to {high}) {unit}".rstrip() + " keep the original."
+    return f" {side} {shown(best.flip, 3)} ({low} to {high}) {unit}".rstrip() + " keep the baseline."
 
 
 def _undecided(robust: Robust, decision: Decision) -> str:

@@ -98,13 +98,13 @@ class MissedLimit(Record):
         if self.excess is None or self.relaxed is None:
             return f"Limit {words} {bound}{where} cannot be judged: the simulation reports no value."
         miss = (
-            f"is missed by {f'{with_error(self.excess, self.error)} {unit}'.rstrip()}"
+            f"is violated by {f'{with_error(self.excess, self.error)} {unit}'.rstrip()}"
             if self.excess > 0.0
-            else "is kept by less than the error"
+            else "is met by less than the error"
         )
         return (
             f"Limit {words} {bound}{where} {miss} (simulated {value}); {self.sense} {f'{self.relaxed:g} {unit}'.rstrip()} would be "
-            f"kept with a probability of {self.probability:g}."
+            f"met with a probability of {self.probability:g}."
         )
 
 
@@ -152,7 +152,7 @@ class Obstacles(Record):
         broken = any(limit.verdict == "broken" for limit in self.limits)
         worst = "broken-limit" if broken or not self.reachable else "open-limit"
         if not self.reachable:
-            least = "No point of the region keeps all limits: the chosen clearances are those that miss them least."
+            least = "No point of the region meets all limits: the chosen clearances violate them least."
             yield Note(worst, least)
         for limit in self.limits:
             sure = limit.verdict == "broken" or not self.reachable
@@ -285,7 +285,7 @@ def original_sentences(study: Problem, baseline: Confirmed) -> list[str]:
         for point, at_point in baseline.at_points.items()
     } or {"": {name: (value, error) for name, value, error in responses}}
     sentences = [
-        f"original design{point}: {', '.join(_figure(name, *figure) for name, figure in row.items())}"
+        f"baseline design{point}: {', '.join(_figure(name, *figure) for name, figure in row.items())}"
         for point, row in figures.items()
     ]
     missed = [limit for limit in every_limit(study, baseline) if limit.verdict != "kept"]
@@ -293,8 +293,8 @@ def original_sentences(study: Problem, baseline: Confirmed) -> list[str]:
     open_words = ", ".join(limit.bound_words for limit in missed if limit.room >= 0.0)
     return [
         *sentences,
-        *([f"the original misses {words}: the study looks for points that do not"] if words else []),
-        *([f"the original keeps {open_words} by less than its error"] if open_words else []),
+        *([f"the baseline violates {words}: the study looks for points that do not"] if words else []),
+        *([f"the baseline meets {open_words} by less than its error"] if open_words else []),
     ]
 
 
@@ -441,7 +441,7 @@ def _reason(forecast: Forecast, rival: Confirmed, pick: Confirmed) -> str:
         worst = max(limits, key=lambda limit: ORDER.index(limit.verdict))
         bound = f"{quantity(worst.response)[0]} {worst.sense} {worst.bound:g}"
         return (
-            f"but it breaks the limit {bound}" if worst.verdict == "broken" else f"but its limit {bound} is undecided"
+            f"but it violates the limit {bound}" if worst.verdict == "broken" else f"but its limit {bound} is undecided"
         )
     here, there = forecast.at(rival.point), forecast.at(pick.point)
     if here is None and forecast.searched is not None:
@@ -449,7 +449,7 @@ def _reason(forecast: Forecast, rival: Confirmed, pick: Confirmed) -> str:
     where = " at the ends of its tolerances" if forecast.with_tolerances else ""
     if here is not None and there is not None:
         if there.keeps and not here.keeps:
-            return f"but {forecast.source} a broken limit{where}"
+            return f"but {forecast.source} a violated limit{where}"
         if (worse := here.costs > there.costs).any():
             return f"but{where} {forecast.source} {_losses(study, here.costs, there.costs, worse, pick)} than at the selected design"
     return "and the study found no reason to reject it: consider it"

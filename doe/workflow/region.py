@@ -431,7 +431,7 @@ def _with_baseline(
     seized = [(running, name) for name, running in _running(original, point, heat) if running.seizes]
     if not seized:
         ends = _endangered(original, point, heat)
-        found = _balanced(original, balance, point, list(ends), "the original design")
+        found = _balanced(original, balance, point, list(ends), "the baseline design")
         seized = [(ends[name], name) for name, outcome in found.items() if not isinstance(outcome, Temperatures)]
     baseline: dict[str, Any] = original.by_factor(point)
     notes = []
@@ -444,7 +444,7 @@ def _with_baseline(
         notes.append(
             Note(
                 "seizure",
-                f"Seizure: {words} of the original design in operation {left}{heats}; gains are over the middle of the region instead.",
+                f"Seizure: {words} of the baseline design in operation {left}{heats}; gains are over the middle of the region instead.",
             )
         )
     return moved.with_file(baseline=baseline), notes

@@ -163,7 +163,7 @@ def find_robust_front(
             baseline=study.baseline,
         )
     except InfeasibleError:
-        note = "no point keeps the limits over the unknown inputs"
+        note = "no point meets the limits over the unknown inputs"
         return RobustFront([], [], q2, note), spent, sets.failures
     candidates = {"pick": (pick, "the selected design"), **_choices(study, robust_front, emulators)}
     designs = {"baseline": study.assignments(study.baseline)}

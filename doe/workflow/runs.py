@@ -104,7 +104,7 @@ def run_design(study: Problem, simulations: clearance.Simulations, progress: Pro
     missed = _cages_missed(study, sound)
     if missed is not None:
         runs_words = f"{counted(int(missed.sum()), 'design run')} of {len(sound)} {are(int(missed.sum()))} outside"
-        sentence_words = f"{runs_words} limits.cage.verdict. Front and selected design stay where the cage of the nearest run keeps it."
+        sentence_words = f"{runs_words} limits.cage.verdict. Front and selected design stay where the cage of the nearest run meets it."
         notes.insert(0, Note("cage-class", sentence_words))
     values, errors, independent = clearance.figures(study.responses, sound)
     block = np.array(design.block_numbers)[rows] if design.blocks > 1 else None

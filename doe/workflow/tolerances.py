@@ -441,8 +441,7 @@ class _PickParts:
     def _promise(self, demands: Sequence[Demand]) -> str:
         """What parts keep, in words."""
         counted = any(demand.least is not None for demand in demands)
-        kept = [*["the gains that count"] * counted, *["all limits"] * bool(self.goals.limited)]
-        return f"keep {' and '.join(kept)}"
+        return " and ".join([*["keep the gains that count"] * counted, *["meet all limits"] * bool(self.goals.limited)])
 
     @property
     def _names(self) -> list[str]:

@@ -146,7 +146,7 @@ def unmet_chains(study: Problem) -> list[str]:
         try:
             search = Allocation(_chain(study, number, study.centre, half_widths))
             if not search.chain.is_stated and not search.fits(search.narrowest()):
-                sentences.append(f"chain {chain.name} will miss its limits: {allocated_reason(search)}")
+                sentences.append(f"chain {chain.name} will violate its limits: {allocated_reason(search)}")
         except (InputError, MethodError):
             continue  # a fault of the study, which its checks report with all others
     return sentences

@@ -130,7 +130,7 @@ def test_impossible_limit_is_one_sentence_with_the_least_violation(tmp_path):
     assert shown.exit_code == 2 and "Traceback" not in shown.output
     assert "no point of the region meets all limits" in shown.stderr
     # The least power loss of the region is 364.95 W.
-    assert "misses power_loss_W <= 300 by 64.9" in shown.stderr
+    assert "violates power_loss_W <= 300 by 64.9" in shown.stderr
     assert len(shown.stderr.strip().splitlines()) == 1
 
 

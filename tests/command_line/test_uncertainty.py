@@ -306,7 +306,7 @@ def test_the_unknown_that_decides_is_named_with_its_flip(judgement: tuple[Proble
     assert first.worth_interval[0] < first.worth < first.worth_interval[1]
     assert found.undecided is None and found.pair is None and found.pairs == 128
     assert words.startswith(f"Most decisive unknown: cage.imbalance_um. Above {first.flip:.3g} (")
-    assert " µm keep the original. Measuring it raises the chance of the right choice by " in words
+    assert " µm keep the baseline. Measuring it raises the chance of the right choice by " in words
     record = json.loads(json.dumps(found.as_dict()))
     assert type(found).from_dict(record).as_dict() == record
 

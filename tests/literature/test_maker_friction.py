@@ -190,5 +190,5 @@ def test_unit_a_study_states_the_makers_friction():
         return str(power(Summary.from_dict(record), {}).blocks)
 
     named, plain = stated(points), stated({"baseline": terms, "pick": terms})
-    assert "over the 80 W of SKF's friction model: baseline 1.50, pick 1.40." in named
+    assert "over the 80 W of SKF's friction model: baseline 1.50, selected design 1.40." in named
     assert "SKF" not in plain

@@ -92,7 +92,7 @@ def test_each_point_has_its_verdicts():
     assert isinstance(table, Table) and list(table.header) == ["point", "share", "impact force", "power loss", "limits"]
     assert [row[0] for row in table.rows] == ["idle", "cruise", "take-off"]
     assert [row[1] for row in table.rows] == ["25 %", "70 %", "5 %"]
-    assert [row[-1] for row in table.rows] == ["✓ kept", "", "? undecided"]
+    assert [row[-1] for row in table.rows] == ["✓ met", "", "? undecided"]
     assert table.rows[0][2] == "▲ 11.16 ± 0.65 % less"
 
 

@@ -75,7 +75,7 @@ def test_the_order_is_clearances_limits_gains_parts_reason_notes(width):
     places = [text.index(words) for words in ORDER]
     lines = text.splitlines()
     verdict = " ".join(lines[: 1 + (width < 80)])
-    assert verdict == "All 3 responses improve and every limit is kept. No danger found; 4 warnings"
+    assert verdict == "All 3 responses improve and every limit is met. No danger found; 4 warnings"
     assert lines[1 + (width < 80)].startswith("made-up bearing; 24000 rpm; 2026-01-31")
     assert places == sorted(places)
     assert "5 more notes in the report" in text and "published table" not in text
@@ -96,7 +96,7 @@ def test_a_limit_has_its_odds_or_the_command_for_them():
     )
     assert unknown.count("Add --robust for probabilities over unknown inputs.") == 1
     assert answer_text(Summary.from_dict(summary())).count("Add --robust for probabilities") == 1
-    assert "57 (51 to 63)" in known and "kept over unknown inputs [%]" in known
+    assert "57 (51 to 63)" in known and "met over unknown inputs [%]" in known
 
 
 @pytest.mark.parametrize(
@@ -120,7 +120,7 @@ def test_a_limit_is_good_news_only_where_it_is_kept_over_the_unknown_inputs_too(
 def test_the_sentence_on_a_missed_limit_does_not_repeat_the_danger(verdict):
     text = answer_text(Summary.from_dict(limited(verdict)))
     assert (
-        "at the selected design. " not in text and {"broken": "✗ broken", "undecided": "? undecided"}[verdict] in text
+        "at the selected design. " not in text and {"broken": "✗ violated", "undecided": "? undecided"}[verdict] in text
     )
     assert "Add --robust for probabilities over unknown inputs." in text
 
@@ -150,7 +150,7 @@ def test_a_chain_that_misses_warns():
     missed = {"mode": "worst_case", "below_mm": 0.0, "above_mm": 0.01, "width_mm": 0.0, "yield_short": None}
     record["chains"]["pocket"] |= {"status": "refused: the sizes are too large", "missed": missed}
     warnings = [text for text, role in roles(record).items() if role == "warning"]
-    assert any("pocket misses its limits" in text and "0.0100 mm" in text for text in warnings)
+    assert any("pocket violates its limits" in text and "0.0100 mm" in text for text in warnings)
     assert not any("misses" in text for text in roles(summary()))
 
 
@@ -194,7 +194,7 @@ def test_a_better_point_was_predicted_worse_at_the_ends_of_its_tolerances(predic
     forecast = Forecast(study.with_surfaces(surfaces), front, None, None)
     (sentence,) = rivals_sentences(forecast, confirmed)
     assert sentence.startswith(
-        f"Point {'pick without tolerances' if name == 'without_tolerances' else name} is better than"
+        f"Point {'design selected without tolerances' if name == 'without_tolerances' else name} is better than"
     )
     here, pick = (forecast.at(points[which].point) for which in (name, "pick"))
     worse = here.costs > pick.costs
@@ -290,7 +290,7 @@ def test_the_verdict_comes_first_and_every_warning_has_a_number():
     record["notes"] = plain([Note("few-samples", "statistical error: uncertain"), Note("remark", "a remark")])
     study = Summary.from_dict(record)
     lines = answer_text(study).splitlines()
-    assert lines[0] == "All 3 responses improve and every limit is kept. No danger found; 3 warnings"
+    assert lines[0] == "All 3 responses improve and every limit is met. No danger found; 3 warnings"
     first = lines.index("Warnings")
     assert [line.partition(". ")[0] for line in lines[first + 1 : first + 4]] == ["1", "2", "3"]
     assert lines[first + 3] == "3. statistical error: uncertain" and lines[first + 4] == "note: a remark"
@@ -329,7 +329,7 @@ def test_the_example_study_has_a_short_first_screen(tmp_path):
 
     answer = doe.study(ROOT / "examples" / "clearance_study.toml", tmp_path)
     text, said = (tmp_path / "answer.txt").read_text("utf-8"), prose(answer.summary)
-    assert text.startswith("All 4 responses improve and every limit is kept. No danger found; ")
+    assert text.startswith("All 4 responses improve and every limit is met. No danger found; ")
     assert all(line in text for line in said.splitlines()) and len(words(said)) <= 210
     assert {gain["verdict"] for gain in answer["gains"].values()} == {"better"}
     assert answer["gains"]["pocket_impact_power_W"]["percent"] == pytest.approx(26.0, abs=2.0)

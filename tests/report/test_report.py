@@ -152,10 +152,10 @@ def test_pick_is_the_one_that_the_study_stands_by():
     text = html_report(Summary.from_dict(record))
     compared = data_of(text)["compared"]
     assert compared["pick"]["x"] == pytest.approx(list(aware["factors"].values()), rel=1e-5)
-    assert compared["pick without tolerances"]["x"] == pytest.approx(list(plain["factors"].values()), rel=1e-5)
+    assert compared["without_tolerances"]["x"] == pytest.approx(list(plain["factors"].values()), rel=1e-5)
     words = " ".join(Outline(text).words)
     assert "Why this point: by what manufacture leaves of it." in words
-    simulated = words[words.index("predicted by the surfaces and simulated, pick without tolerances") :]
+    simulated = words[words.index("predicted by the surfaces and simulated, design selected without tolerances") :]
     # Its own simulated gain, not that of the selected design.
     assert "11.16 ± 0.65 % less" in simulated[:400] and "5.5" not in simulated[:200]
 

@@ -113,7 +113,7 @@ def test_the_probability_of_a_limit_is_the_share_of_its_classes(tmp_path):
 @pytest.mark.parametrize(
     ("at_pick", "code", "words"),
     [
-        ({"held": 8}, 0, "0.895 (held 8/8) ✓ kept 0.895 ✓ 0.895 (held 8/8)"),
+        ({"held": 8}, 0, "0.895 (held 8/8) ✓ met 0.895 ✓ 0.895 (held 8/8)"),
         (
             {"fast_whirl": 8},
             1,

@@ -164,7 +164,7 @@ def test_unit_a_refused_chain_shows_who_takes_what_and_that_a_yield_meets_it():
     for words in (
         'Write mode = "yield" under allocate',
         "Contributions",
-        "misses its limits: ",
+        "violates its limits: ",
         "0.0310 mm in worst case",
     ):
         assert words in shown, words
@@ -180,7 +180,7 @@ def test_unit_a_chain_that_matching_meets_names_the_classes_to_write():
     assert 'selective = { first = "a", second = "b", classes = 4 }' in refused.remedy.sentence
     pair = {"first": "a", "second": "b", "classes": 4}
     matched = solve(with_functions(chain(links, limits), selective=pair), samples=1000)
-    assert matched.status == "ok: matched in 4 classes; random assemblies miss the limits"
+    assert matched.status == "ok: matched in 4 classes; random assemblies violate the limits"
 
 
 def test_unit_a_chain_off_its_place_is_met_by_neither():

@@ -153,7 +153,7 @@ def test_unit_dangers_of_a_choice():
     assert worse_notes(gains) == ()
     found = obstacles("broken", chains={"guide": "misses"}).notes
     assert {note.code for note in found} == {"broken-limit", "missed-chain"}
-    assert found[0].startswith("Limit power loss <= 250 W is missed by 5.0 ± 1.0 W") and "guide: misses" in found[-1]
+    assert found[0].startswith("Limit power loss <= 250 W is violated by 5.0 ± 1.0 W") and "guide: misses" in found[-1]
     assert {note.code for note in obstacles("undecided").notes} == {"open-limit"}
     assert obstacles("undecided", reachable=False).notes[0].level == Level.DANGER
     assert obstacles(None).notes == ()

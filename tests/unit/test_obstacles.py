@@ -64,14 +64,14 @@ def test_a_limit_that_no_point_keeps_ends_in_a_report_with_the_best_point(tmp_pa
     assert missed["excess"] == pytest.approx(simulated - 5.0) and missed["relaxed"] > simulated
     assert simulated == pytest.approx(least_impact(Problem.load(path)), abs=1.5)
     sentences = record["obstacles"]["sentences"]
-    assert sentences[0].startswith("No point of the region keeps all limits") and "relax the limits" in sentences[2]
+    assert sentences[0].startswith("No point of the region meets all limits") and "relax the limits" in sentences[2]
     # The lower impact costs whirl, which this study wants large.
     worse, *obstacles = shown.stderr.splitlines()
     assert worse.startswith("danger: the selected design is worse than the baseline: whirl deviation ratio 31.")
     assert obstacles == sentences
-    assert "No point of the region keeps all limits" in (out / "report.html").read_text("utf-8")
+    assert "No point of the region meets all limits" in (out / "report.html").read_text("utf-8")
     answer = (out / "answer.txt").read_text("utf-8")
-    assert answer.index("No point of the region") < answer.index("Chosen clearances") < answer.index("✗ broken")
+    assert answer.index("No point of the region") < answer.index("Chosen clearances") < answer.index("✗ violated")
     again = commanded(path, "-q")
     assert again.exit_code == 1 and "Finished before" in again.stdout and sentences[1] in again.stderr
 
@@ -132,7 +132,7 @@ def test_a_limit_that_the_tolerances_break_is_an_obstacle_too(tmp_path, monkeypa
     assert answer["limits"]["impact_force_N"]["verdict"] == "kept" and answer["status"] == "missed"
     (sentence,) = answer["obstacles"]["sentences"]
     assert sentence.startswith(
-        "No point keeps all limits at the ends of the factors' own tolerances: the closest misses impact"
+        "No point meets all limits at the ends of the factors' own tolerances: the closest violates impact"
     )
     assert commanded(path, "-q").exit_code == 1
 
@@ -169,10 +169,10 @@ def test_the_point_of_the_duty_that_misses_is_named(tmp_path, monkeypatch):
     answer = doe.study(path, tmp_path / "out", notice=said.append)
     (missed,) = answer["obstacles"]["limits"]
     assert (missed["response"], missed["point"]) == ("impact_force_N", "cruise")
-    assert "Limit impact force <= 40 N at cruise is missed by " in answer["obstacles"]["sentences"][1]
-    shown = [sentence for sentence in said if sentence.startswith("original design at ")]
-    assert [sentence.split(":")[0] for sentence in shown] == ["original design at cruise", "original design at idle"]
-    assert any(sentence.startswith("the original misses cruise: impact force <= 40 N by ") for sentence in said)
+    assert "Limit impact force <= 40 N at cruise is violated by " in answer["obstacles"]["sentences"][1]
+    shown = [sentence for sentence in said if sentence.startswith("baseline design at ")]
+    assert [sentence.split(":")[0] for sentence in shown] == ["baseline design at cruise", "baseline design at idle"]
+    assert any(sentence.startswith("the baseline violates cruise: impact force <= 40 N by ") for sentence in said)
 
 
 @pytest.mark.parametrize(("bound", "unlikely"), [(5.0, True), (44.0, False)])
@@ -187,8 +187,8 @@ def test_the_corners_say_before_the_design_ends_what_is_likely(bound, unlikely, 
     # The time of the rest follows the machine.
     plan, original, missed, *others = [sentence for sentence in said if not sentence.startswith("the rest takes ")]
     assert plan.startswith("22 to 27 runs (baseline 1, design runs 20, ") and said[plan] == 0
-    assert original.startswith("original design: impact force ") and said[original] == 1
-    assert missed.startswith(f"the original misses impact force <= {bound:g} N by ") and said[missed] == 1
+    assert original.startswith("baseline design: impact force ") and said[original] == 1
+    assert missed.startswith(f"the baseline violates impact force <= {bound:g} N by ") and said[missed] == 1
     likely = [sentence for sentence in others if sentence.startswith("likely no point meets impact force <= 5 N: ")]
     assert len(likely) == unlikely and all(8 < said[sentence] < 21 for sentence in likely)
 
@@ -256,7 +256,7 @@ def test_two_points_of_a_duty_are_shown_one_a_line(tmp_path, monkeypatch):
     path = limited_study(tmp_path, more=[QUICK, ("[front]", f"{IDLE_AND_CRUISE}\n[front]")])
     shown = commanded(path, "--json")
     json.loads(shown.stdout)
-    lines = [line for line in shown.stderr.splitlines() if line.startswith("note: original design at ")]
+    lines = [line for line in shown.stderr.splitlines() if line.startswith("note: baseline design at ")]
     assert len(lines) == 2 and all("power loss " in line and " W" in line for line in lines)
 
 

@@ -46,6 +46,6 @@ def test_only_what_keeps_its_limits_is_picked():
     costs = np.array([[0.0, 4.0], [1.0, 1.0], [1.5, 1.5], [4.0, 0.0]])
     broken = np.array([[0.0], [1.0], [0.0], [0.0]])
     row, reason = pick_among(costs, broken, GOALS, [np.array([5.0, 5.0])], "knee")
-    assert row == 2 and "keep their limits" in reason
+    assert row == 2 and "meet their limits" in reason
     row, reason = pick_among(costs, broken + 1.0, GOALS, [], "knee")
-    assert row == 0 and "none of which keeps all limits" in reason
+    assert row == 0 and "none of which meets all limits" in reason

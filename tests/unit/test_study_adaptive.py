@@ -253,7 +253,7 @@ def test_faults_are_one_sentence_each(tmp_path, monkeypatch):
         'name = "power_loss_W"\nmodel = "quadratic"\nupper = -5.0\n',
     )
     with pytest.raises(
-        InputError, match=r"no point of the region meets all limits. The closest .* misses power_loss_W <= -5"
+        InputError, match=r"no point of the region meets all limits. The closest .* violates power_loss_W <= -5"
     ):
         search(written(tmp_path / "limit", limit), tmp_path / "limit", 1)
 

@@ -120,7 +120,7 @@ def test_a_broken_limit_warns_before_gains_and_fails_the_study_also_when_asked_a
     first, again = (CliRunner().invoke(app, arguments) for _ in range(2))
     for shown in (first, again):
         assert shown.exit_code == 1, shown.output
-        words = ("Danger: Limit impact force <= 35", "Chosen clearances", "✗ broken", "Changes confirmed")
+        words = ("Danger: Limit impact force <= 35", "Chosen clearances", "✗ violated", "Changes confirmed")
         places = [*map(shown.stdout.index, words)]
         assert places == sorted(places) and "LIMIT BROKEN" not in shown.stdout
     assert "Finished before" in again.stdout
@@ -131,7 +131,7 @@ def test_a_broken_limit_warns_before_gains_and_fails_the_study_also_when_asked_a
     assert "Danger: Limit impact force" in answer and "Add --robust" in answer
     assert record["tried"] == 2
     page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
-    assert "✗ broken" in page and ">limit<" in page
+    assert "✗ violated" in page and ">limit<" in page
     assert not re.search(r'class="statement">[^<]*(LIMIT|a real loss|no gain)', page)
     assert "broken" in (tmp_path / "out" / "confirmation.csv").read_text(encoding="utf-8")
 

@@ -95,7 +95,7 @@ def test_confirmation_that_fails_ends_the_study_in_a_sentence(tmp_path, monkeypa
     instantly(monkeypatch.setattr, faulty=(1 + clearance.CONFIRMATION_SEEDS,))
     with Store(tmp_path / STORE) as store:
         simulations = Simulations(store, 2, None, False, lambda title: silent)
-        with pytest.raises(RunError, match=r"^the original design cannot be simulated: baseline: .*the oil froze$"):
+        with pytest.raises(RunError, match=r"^the baseline design cannot be simulated: baseline: .*the oil froze$"):
             simulate_original(study, simulations)
         original = Confirmed(study.baseline, *np.ones((3, 3)))
         with pytest.raises(RunError, match=r"^confirmation of the selected design: .*the oil froze$"):

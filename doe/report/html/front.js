@@ -40,7 +40,7 @@
 
   function fill(number) {
     const head = page.element("tr", ""), body = by("front_point").tBodies[0];
-    head.append(...["", "chosen", ...compared].map(words => page.element("th", words, {scope: "col"})));
+    head.append(...["", "chosen", ...compared.map(name => name === "pick" ? "selected" : name)].map(words => page.element("th", words, {scope: "col"})));
     by("front_point").tHead.replaceChildren(head);
     body.replaceChildren(...rows(number).map(([name, ...cells]) => {
       const row = page.element("tr", "");

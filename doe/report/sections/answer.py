@@ -39,7 +39,7 @@ GRADE = "grade of the parts"
 # Share of the cases over the unknown inputs from which a verdict counts as good news.
 NEARLY_ALL = 0.9
 SENTENCE_END = re.compile(r"(?<=\.) (?=[A-Z])")
-LIMITS_NOTE = "A limit is kept or broken if the value is on that side of it by more than its error, else undecided. The probability of keeping it follows from that error."
+LIMITS_NOTE = "A limit is met or violated if the value is on that side of it by more than its error, otherwise undecided. The probability of meeting it follows from that error."
 
 
 def answer(summary: Summary, motion: Mapping[str, Any]) -> Section | None:
@@ -137,9 +137,7 @@ def good_news(summary: Summary) -> str:
     )
     rest = "" if len(real) == count else f", of {counted(count, 'response')}"
     kept = (
-        " and every limit is kept"
-        if summary.limits and not (summary.obstacles.limits or summary.obstacles.cage)
-        else ""
+        " and every limit is met" if summary.limits and not (summary.obstacles.limits or summary.obstacles.cage) else ""
     )
     return f"{whole}{rest}{kept}."
 
@@ -240,7 +238,7 @@ def _robust_points(summary: Summary) -> Table:
     front = summary.robust and summary.robust.front
     rows = [
         [
-            point.name.removeprefix("robust "),
+            point_words(point.name.removeprefix("robust ")),
             *(factor.text(point.factors[factor.name], 1) for factor in inputs),
             *(_gain_and_share(point.gains.get(name), point.chances.gains.get(name)) for name in names),
             _gain_and_share(None, point.chances.all),
@@ -329,7 +327,7 @@ def _limits_judged(summary: Summary) -> Table:
                 f"{LIMITS[base.verdict][:1]} {with_error(base.value, base.error)}{classes[0]}",
             )
         )
-    shares = "kept over unknown inputs [%]"
+    shares = "met over unknown inputs [%]"
     header = ("limit", "selected", "verdict", "probability", shares, "baseline")
     return Table("Limits judged by simulation", header, rows, text_columns=(2,))
 
@@ -461,7 +459,7 @@ ROW = 34.0  # height of the bars of a term [pt]
 
 def power(summary: Summary, motion: Mapping[str, Any]) -> Section:
     """Power by term at the confirmed points, baseline and pick as bars."""
-    confirmed = {name.replace("_", " "): point for name, point in summary.confirmation.items()}
+    confirmed = {point_words(name): point for name, point in summary.confirmation.items()}
     points = {name: point.power_terms_W for name, point in confirmed.items() if point.power_terms_W}
     every = list(dict.fromkeys(term for terms in points.values() for term in terms))
     # Terms of laws that the scene leaves out are zero everywhere.
@@ -470,7 +468,7 @@ def power(summary: Summary, motion: Mapping[str, Any]) -> Section:
     rows = [[term.replace("_", " "), *(_watts(terms_of.get(term)) for terms_of in points.values())] for term in terms]
     notes = ["Terms that are zero everywhere are left out."] if len(terms) < len(every) else []
     notes += _maker(confirmed)
-    bars: dict[str, dict[str, float]] = {name: points[name] for name in ("baseline", "pick") if name in points}
+    bars = {name: points[name] for name in map(point_words, ("baseline", "pick")) if name in points}
     blocks: list[Block] = [
         *([Figures([power_bars(terms, bars).svg], "Power loss by cause.")] if bars else []),
         Table("Power loss by term", ["term", *(f"{name} [W]" for name in points)], rows, " ".join(notes)),

@@ -89,7 +89,7 @@ def _parts_table(name: str, chain: ChainResult) -> Table:
     title = f"Dimension chain {label(name)}"
     if chain.refused:
         stated = all(size.origin == "stated" for size in chain.drawn_sizes.values())
-        title += f": {'the stated sizes' if stated else 'even the narrowest tolerances'} miss the limits"
+        title += f": {'the stated sizes' if stated else 'even the narrowest tolerances'} violate the limits"
     elif chain.status == "ok":
         title += ": the stated sizes meet the limits"
     return _sizes_table(title, name, chain.drawn_sizes, estimates_note(chain.drawn_sizes))
@@ -177,10 +177,10 @@ def _refusal(name: str, chain: ChainResult) -> list[Block]:
 
 
 def _miss(name: str, chain: ChainResult) -> str:
-    """'Chain pocket misses its limits: 0.3300 mm below the lower limit.'"""
+    """'Chain pocket violates its limits: 0.3300 mm below the lower limit.'"""
     missed = chain.missed
     if missed and missed.yield_short:
-        return f"Chain {label(name)} misses its yield: {missed.yield_short:.4g} of the assemblies too many are outside its limits."
+        return f"Chain {label(name)} does not reach its yield: {missed.yield_short:.4g} of the assemblies too many are outside its limits."
     ends = (
         ()
         if missed is None
@@ -191,7 +191,7 @@ def _miss(name: str, chain: ChainResult) -> str:
         )
     )
     figures = [f"{size:.4f} mm {words}" for size, words in ends if size]
-    return f"Chain {label(name)} misses its limits: {', '.join(figures) or chain.status}."
+    return f"Chain {label(name)} violates its limits: {', '.join(figures) or chain.status}."
 
 
 def _shares_table(name: str, chain: ChainResult) -> Table:
@@ -276,8 +276,8 @@ def _selective(assembly: SelectiveAssembly) -> list[Block]:
     """Selective assembly: two parts matched in classes."""
     low, high = assembly.worst_case_mm
     needed = assembly.classes_needed
-    enough = "no number of classes keeps the limits" if needed is None else f"{needed} classes keep the limits"
-    enough = "random assemblies keep the limits" if needed == 1 else enough
+    enough = "no number of classes meets the limits" if needed is None else f"{needed} classes meet the limits"
+    enough = "random assemblies meet the limits" if needed == 1 else enough
     good = with_error(assembly.good, NORMAL * assembly.standard_error)
     rows = [(label(name), "  ".join(f"{edge:.4f}" for edge in edges)) for name, edges in assembly.edges_mm.items()]
     return [

@@ -292,7 +292,7 @@ DUTY_POINTS: tuple[Column[DutyFigure], ...] = (
         unit="of the response",
         meaning="means there",
     ),
-    Column("pick", at=("pick", "value"), cell=lambda row: row.pick.text),
+    Column("pick", words="selected", at=("pick", "value"), cell=lambda row: row.pick.text),
     Column(
         "baseline_error",
         at=("baseline", "error"),

@@ -9,7 +9,7 @@ from doe.report.sections.record import SENSES, change, nearest, share_with_inter
 from doe.report.sections.search import in_few_runs
 from doe.report.still import Still
 from doe.report.summary import Summary
-from doe.workflow.confirmation import ConfirmedPoint
+from doe.workflow.confirmation import ConfirmedPoint, point_words
 from doe.workflow.judgement import ConfirmedGain, GainPoint, RobustFront
 from doe.workflow.problem import Asked
 from doe.workflow.surface_front import (
@@ -40,7 +40,7 @@ def front_sheet(factors: Sequence[str], responses: Sequence[str], points: Sequen
 def front(summary: Summary, motion: Mapping[str, Any]) -> Section:
     """Pictures that answer to the pointer, the picks, and what they are compared with."""
     marks, result = picks(summary), summary.front
-    where = f"of the {WITHOUT}" if WITHOUT in marks else "of the selected design"
+    where = f"of the {WITHOUT}" if "without_tolerances" in marks else "of the selected design"
     blocks = _pictures(summary.asked, fronts(summary), marks, summary.confirmation)
     blocks += _judged(summary.asked, result, marks, where)
     blocks += [tolerances(summary.tolerances or {}), Paragraph(summary.tolerances_sentence or ""), *_search(result)]
@@ -97,7 +97,7 @@ def fronts(summary: Summary) -> list[Front]:
 def picks(summary: Summary) -> dict[str, Point]:
     """Baseline and picks of the front by name; "pick" is the one of the study.
 
-    That is the pick of the front, or the one with tolerances; then the other is the pick without tolerances.
+    That is the pick of the front, or the one with tolerances; then the other is "without_tolerances".
     """
     result = summary.front
     rules: dict[str, Point] = {"knee": result.knee, **result.picks}
@@ -106,13 +106,13 @@ def picks(summary: Summary) -> dict[str, Point]:
     )
     if overtaking:
         del rules[overtaking]
-        rules[WITHOUT] = result.pick
+        rules["without_tolerances"] = result.pick
     # The surfaces at the pick itself, which is rounded to the resolution of the drawing.
     return _marks(result, rules | {"pick": summary.pick_on_surfaces})
 
 
 def _marks(result: SurfaceFront, points: Mapping[str, Point]) -> dict[str, Point]:
-    return {"baseline": result.baseline} | {name.replace("_", " "): point for name, point in points.items()}
+    return {"baseline": result.baseline, **points}
 
 
 def _pictures(
@@ -161,7 +161,7 @@ def robust_stills(front: RobustFront | None) -> list[Still]:
 def _picks(caption: str, asked: Asked, marks: Mapping[str, Point], detail: Detail = Detail.LEAST) -> Table:
     rows = [
         [
-            name,
+            point_words(name),
             *(factor.text(point.factors[factor.name], 1) for factor in asked.factors),
             *(with_error(point.responses[response], _error(point, response)) for response in asked.names),
         ]
@@ -204,9 +204,9 @@ def _doubt(result: SurfaceFront) -> list[Block]:
 LIMITS: tuple[Column[SurfaceLimit], ...] = (
     Column("limit", cell=lambda limit: f"{label(limit.response)} {SENSES[limit.sense]} {shown(limit.limit)}"),
     Column("value", error="error"),
-    Column("kept", words="kept by the value"),
-    Column("probability", chance, "probability of keeping it"),
-    Column("demanded_probability", words="demanded"),
+    Column("kept", words="met by the value"),
+    Column("probability", chance, "probability of meeting it"),
+    Column("demanded_probability", words="required"),
 )
 
 
@@ -256,8 +256,8 @@ def _with_tolerances(asked: Asked, aware: ToleranceFront | None) -> list[Block]:
     points = {
         "baseline": aware.baseline_robust,
         WITHOUT: aware.plain_pick_robust,
-        "pick": aware.pick.robust,
-        "pick, nominal": aware.pick.responses,
+        "selected design": aware.pick.robust,
+        "selected design, nominal": aware.pick.responses,
     }
     rows = [(point, *(shown(values.get(name), 5) for name in asked.names)) for point, values in points.items()]
     place = ", ".join(
@@ -268,7 +268,7 @@ def _with_tolerances(asked: Asked, aware: ToleranceFront | None) -> list[Block]:
     more = "" if percent is None else f" and {percent:.2f} % more at the ends of the tolerances"
     sentences = [
         f"Front with tolerances: {counted(len(aware.front), 'point')}.",
-        f"Pick: {place}; {aware.pick.reason}.",
+        f"Selected design: {place}; {aware.pick.reason}.",
         f"Compared with the front without tolerances, it has {aware.nominal_loss_percent:.2f} % less hypervolume at nominal values{more}.",
     ]
     if survival.plain_pick is not None and survival.pick is not None:

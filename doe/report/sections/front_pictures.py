@@ -13,7 +13,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from doe.report.still import COLOURS, SMALL, Point, Still, name_marks
-from doe.workflow.confirmation import ConfirmedPoint
+from doe.workflow.confirmation import ConfirmedPoint, point_words
 from doe.workflow.problem import Factor
 from doe.workflow.surface_front import Point as FrontPoint
 from rbdyn.base.words import label, quantity, shown
@@ -32,7 +32,7 @@ MARKS = {
     "knee": ("D", 8.0, "orange"),
     "desirability": ("^", 9.0, "green"),
     "weights": ("v", 9.0, "purple"),
-    "pick without tolerances": ("P", 10.0, "vermilion"),
+    "without_tolerances": ("P", 10.0, "vermilion"),
 }
 
 
@@ -215,8 +215,8 @@ def _dots(axis: "Axes", role: str, x: Sequence[float], y: Sequence[float]) -> No
 
 def _mark(axis: "Axes", name: str, place: Point, simulated: bool = False) -> None:
     """A point with a name, hollow where it is simulated."""
-    words = name.replace("_", " ")
-    marker, size, shade = MARKS.get(words, OTHER)
+    words = point_words(name)
+    marker, size, shade = MARKS.get(name, OTHER)
     colour, paper = COLOURS[shade], COLOURS["paper"]
     face, edge, thick = (paper, colour, 1.6) if simulated else (colour, paper, 0.8)
     (line,) = axis.plot(
@@ -247,7 +247,8 @@ def _legend(sets: Sequence[Front], names: Sequence[str], confirmed: bool, limite
         )
     for name in names:
         marker, size, colour = MARKS.get(name, OTHER)
-        handles.append(Line2D([], [], linestyle="", marker=marker, color=COLOURS[colour], markersize=size, label=name))
+        look = {"color": COLOURS[colour], "markersize": size, "label": point_words(name)}
+        handles.append(Line2D([], [], linestyle="", marker=marker, **look))
     if confirmed:
         hollow: dict[str, Any] = {"markerfacecolor": COLOURS["paper"], "markersize": 8.0, "color": COLOURS["ink"]}
         handles.append(Line2D([], [], linestyle="", marker="s", **hollow, label="hollow: simulated"))

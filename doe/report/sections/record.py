@@ -21,7 +21,7 @@ from rbdyn.base.words import improvement, label, quantity, shown
 SENSES = {"<=": "≤", ">=": "≥"}
 VERDICTS = {"better": "▲ better", "worse": "▼ worse", "within error": "● within error"}
 SIGNS_NOTE = "▲ better, ▼ worse, ● within its 95 % error."
-LIMITS = {"kept": "✓ kept", "broken": "✗ broken", "undecided": "? undecided"}
+LIMITS = {"kept": "✓ met", "broken": "✗ violated", "undecided": "? undecided"}
 # Characters above which a value is a sentence, which may take several lines.
 LONG = 40
 # The efficiencies of a design are named by a capital letter.

@@ -150,9 +150,9 @@ def _where(spent: Runs, pick: Mapping[str, float], one: str, two: str, axis: "Ax
         color=COLOURS["vermilion"],
         markeredgecolor=COLOURS["paper"],
         markersize=15,
-        label="pick",
+        label="selected design",
     )
-    name_marks(star, "pick", ["pick"])
+    name_marks(star, "pick", ["selected design"])
     axis.set(xlabel=label(one), ylabel=label(two))
     axis.legend(ncol=3, markerscale=0.8, title="size: replicates", title_fontsize=SMALL, **BENEATH)
 

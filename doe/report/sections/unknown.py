@@ -267,7 +267,7 @@ def _odds(robust: Robust) -> Table:
     ]
     header = ("response", "selected better [%]", "explained by the inputs")
     every = ("all of these", robust.chances.all.of_hundred, "")
-    return Table("Probability that the selected design is better than the original", header, [*rows, every])
+    return Table("Probability that the selected design is better than the baseline", header, [*rows, every])
 
 
 def _limits(summary: Summary) -> Table:
@@ -277,13 +277,13 @@ def _limits(summary: Summary) -> Table:
         for name, limit in summary.limits.items()
         if limit.odds
     ]
-    return Table("Limits over the unknown inputs", ("response", "limit", "kept [%]"), rows, text_columns=(1,))
+    return Table("Limits over the unknown inputs", ("response", "limit", "met [%]"), rows, text_columns=(1,))
 
 
 def decider_sheet(robust: Robust) -> Sheet[Decider]:
     """By input: what measuring it is worth, and the value at which the choice flips."""
     note = "Points: by how much of 100 the chance of the right choice rises."
-    content = "The inputs that decide between the selected design and the original, by worth."
+    content = "The inputs that decide between the selected design and the baseline, by worth."
     return Sheet("Inputs that decide", DECIDERS, robust.decides, note, file="decides.csv", content=content)
 
 
