@@ -236,20 +236,28 @@ class PickTolerances:
             texts.append(f"{quantity(name)[0]} {low} to {high}")
         return ", ".join(texts)
 
+    def _freed(self, name: str) -> str:
+        """'Then 95 % of the parts improve power loss by 0.90 to 1.20 %.' of a response whose gain does not count."""
+        low, high = self.free[name]
+        if low < 0.0:
+            return f"Then 95 % of the parts have {self._spread([name])}."
+        return f"Then 95 % of the parts improve {quantity(name)[0]} by {low:.2f} to {high:.2f} %."
+
     @property
     def warning(self) -> str:
         """Parts of too fine a grade, what demands them, and what letting that go would give; empty if there are none."""
         at_rim = dict(zip(self.factors, self.widest.at_rim.tolist(), strict=True))
         rim, fine = ([name for name in self.too_fine if at_rim[name] is side] for side in (True, False))
-        grade, cause, sentences = f"IT{self.settings.finest_grade}", _limit_words(self.widest.limited_by), list[str]()
-        if fine and not self.any_width:
-            sentences.append(f"{_begun(cause)} leaves no tolerance.")
-        elif fine:
-            sentences.append(f"{_begun(cause)} requires parts finer than {grade}: {self._listed(fine)}.")
+        grade, sentences = f"IT{self.settings.finest_grade}", list[str]()
+        if fine:
+            needs = (
+                f"requires parts finer than {grade}: {self._listed(fine)}" if self.any_width else "leaves no tolerance"
+            )
+            sentences.append(f"{_requirement(self.widest.limited_by)} {needs}.")
         if fine and self.relaxed is not None:
             wider, limit = self.relaxed._listed(fine), _limit_words(self.relaxed.widest.limited_by)
             sentences.append(f"Without this requirement the tolerance could be {wider}, limited by {limit}.")
-            sentences.append(f"Then 95 % of the parts have {self.relaxed._spread([self.limiting_gain])}.")
+            sentences.append(self.relaxed._freed(self.limiting_gain))
         elif fine:
             sentences.append("A design farther from this limit would allow wider tolerances.")
         if rim:
@@ -275,8 +283,10 @@ def _limit_words(limit: str) -> str:
     return limit if limit == RIM else f"the limit {' '.join((quantity(name)[0], bound, quantity(name)[1]))}".rstrip()
 
 
-def _begun(words: str) -> str:
-    return words[:1].upper() + words[1:]
+def _requirement(limit: str) -> str:
+    """What parts have to do for the gain or the limit that limits the tolerances."""
+    words = _limit_words(limit)
+    return f"Keeping {words}" if limit.startswith(GAIN) else f"Meeting {words}"
 
 
 def widest_tolerances_of(
