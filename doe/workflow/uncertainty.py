@@ -198,7 +198,7 @@ def _varying(case: Case, sets: Sets, idle: dict[str, float]) -> tuple[Case, Sets
 
 def _idle_notes(idle: Mapping[str, float]) -> list[Note]:
     return [
-        Note("remark", f"{name}: is {value:.5g} in every input set, because no unknown input changes it")
+        Note("remark", f"{name}: it is {value:.5g} in every input set, because no unknown input changes it")
         for name, value in idle.items()
     ]
 

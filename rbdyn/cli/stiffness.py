@@ -99,11 +99,9 @@ class StiffnessMap(Record):
 
     def _notes(self) -> Notes:
         if self.loss_factor:
-            damping = f"damping: a loss factor of {self.loss_factor:g} at the speed of the inner ring, c = loss factor k/speed"
+            damping = f"damping: c = {self.loss_factor:g} k/speed follows from the loss factor and the speed of the inner ring"
         else:
-            damping = (
-                "damping: is 0, for static loads give none; state --loss-factor or add it where the rotor is computed"
-            )
+            damping = "damping: it is 0, because static loads give none. State --loss-factor or add it where the rotor is computed"
         return (Note("left-out", damping),)
 
     @property

@@ -314,7 +314,7 @@ def stiffness_notes(scene: Scene, runs: Sequence[Replicate]) -> Notes:
     cost = stiffness_cost(runs)
     if cost["implicit_runs"] and scene.numerics.method == "auto":
         sentence = (
-            f"method: {cost['implicit_runs']:g} of {len(runs)} runs by the linearly implicit one, because stability would limit "
+            f"method: {cost['implicit_runs']:g} of {len(runs)} runs use the linearly implicit one, because stability would limit "
             "explicit steps and a trial showed it to be cheaper"
         )
         return (Note("method", sentence),)

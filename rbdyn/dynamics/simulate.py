@@ -239,7 +239,7 @@ def _balance_notes(scene: Scene, power_gap: float) -> Notes:
     if power_gap <= LARGEST_POWER_GAP:
         return ()
     sentence = (
-        f"power balance: closes only to {100.0 * power_gap:.2g} %, because numerics.rtol = {scene.numerics.rtol:g} is too loose. "
+        f"power balance: it closes only to {100.0 * power_gap:.2g} %, because numerics.rtol = {scene.numerics.rtol:g} is too loose. "
         "Loose tolerances bias impact and whirl upward, power loss downward. Reduce it tenfold"
     )
     return (Note("power-balance", sentence),)
@@ -249,7 +249,7 @@ def _model_notes(scene: Scene) -> Notes:
     """What the chosen laws miss."""
     notes = list[Note]()
     if cutoff := scene.numerics.whirl_cutoff_hz:
-        sentence = f"whirl deviation ratio: of the motion below {cutoff:g} Hz (numerics.whirl_cutoff_hz)"
+        sentence = f"whirl deviation ratio: it counts only motion below {cutoff:g} Hz (numerics.whirl_cutoff_hz)"
         notes.append(Note("definition", sentence))
     if scene.traction.model == "four_constant":
         sentence = (
@@ -259,7 +259,7 @@ def _model_notes(scene: Scene) -> Notes:
         notes.append(Note("left-out", sentence))
     if scene.traction.model == "thermal_newtonian" and scene.lubricant.viscosity_mPas is not None:
         sentence = (
-            "traction: follows the oil and its temperature, not lubricant.viscosity_mPas, which the films use; choose "
+            "traction: it follows the oil and its temperature, not lubricant.viscosity_mPas, which the films use; choose "
             "traction.rheology_oil to suit it"
         )
         notes.append(Note("remark", sentence))

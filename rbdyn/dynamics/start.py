@@ -103,10 +103,10 @@ def with_start(balanced: Balanced) -> SimulationResult:
     try:
         start, notes, runs = _start(balanced)
     except InputError as error:
-        note = Note("seizure", f"start: the cold machine: {error.faults[0]}")
+        note = Note("seizure", f"start: the cold machine cannot run: {error.faults[0]}")
         return replace(result, status=_status(result, "seizure"), notes=(note, *result.notes))
     except RunError as error:
-        note = Note("failed", f"start: the cold machine: {error}")
+        note = Note("failed", f"start: the cold machine cannot run: {error}")
         return replace(result, notes=(note, *result.notes))
     cost = {**result.cost, **work_done([*balance.runs, *(run for each in runs for run in each.runs)])}
     turns = balance.turns + sum(each.turns for each in runs)

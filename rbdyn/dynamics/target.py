@@ -327,7 +327,8 @@ def _shortfall(target: float, errors: dict[str, float | None], result: Simulatio
     unknown = [name for name, error in errors.items() if error is None]
     if unknown:
         return Note(
-            "target", f"target of {100.0 * target:g} % not met: no relative error is known of {', '.join(unknown)}"
+            "target",
+            f"target: {100.0 * target:g} % is not met, because no relative error is known of {', '.join(unknown)}",
         )
     worst = max(errors, key=lambda name: errors[name] or 0.0)
     figure = result.figures[worst]
@@ -337,7 +338,7 @@ def _shortfall(target: float, errors: dict[str, float | None], result: Simulatio
     else:
         limit = f"its scatter over {choice.replicates} replicates of {choice.turns:g} turns limits it"
     sentence = (
-        f"target of {100.0 * target:g} % not met: {worst} is known to {100.0 * (errors[worst] or 0.0):.2g} %, and {limit}; ask "
+        f"target: {100.0 * target:g} % is not met. {worst} is known to {100.0 * (errors[worst] or 0.0):.2g} %, and {limit}. Ask "
         "for less, or run longer by numerics.turns and numerics.replicates"
     )
     return Note("target", sentence)

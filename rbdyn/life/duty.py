@@ -134,4 +134,4 @@ def life_notes(life: float, hours: float) -> Notes:
     """A note on a ``life`` [h] below the ``hours`` of the duty: the sum of its shares, where it is not that of shares of 1."""
     if abs(hours - 1.0) <= SHARE_ROUNDING or life >= hours:
         return ()
-    return (Note("short-life", f"life: {life:.3g} h over the duty, below its {hours:.6g} h (the sum of the shares)"),)
+    return (Note("short-life", f"life: {life:.3g} h over the duty is below its {hours:.6g} h (the sum of the shares)"),)

@@ -127,7 +127,7 @@ def _notes(points: Sequence[Point], least: Point, longest: Point, name: str, uni
         for end, word in ((points[0].value, "lower"), (points[-1].value, "upper")):
             if abs(point.value - end) <= 1e-3 * span:
                 sentence = (
-                    f"{goal}: is at the {word} end of the range, {name} {scale * end:.4g} {unit}, without an optimum "
+                    f"{goal}: it is at the {word} end of the range, {name} {scale * end:.4g} {unit}, without an optimum "
                     "inside; widen the range or accept the end"
                 )
                 notes.append(Note("optimum", sentence))

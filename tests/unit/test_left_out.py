@@ -90,7 +90,7 @@ def test_unit_notes_only_where_it_matters(outer, make_scene):
     # Without any loss there is no share.
     assert left_out_notes(outer, 0.0) == ()
     tilted = left_out_notes(make_scene("bearing.tilt_mrad=0.4"), 1e4)
-    assert [note.split(". Effect")[0] for note in tilted] == [
+    assert [note.split(", which")[0] for note in tilted] == [
         "not modelled: skew of rollers",
         "not modelled: contact of roller ends and flanges",
     ]

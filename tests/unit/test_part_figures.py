@@ -156,6 +156,6 @@ def test_uncertainties_of_parts(tmp_path):
     assert shown.returncode == 0, shown.stderr
     answer = json.loads(shown.stdout)
     assert {"land_film_power_W", "outer_max_pressure_MPa", "inner_minimum_film_um"} <= set(answer["responses"])
-    assert any("pocket_film_power_W: is 0 in every input set" in note["text"] for note in answer["notes"])
+    assert any("pocket_film_power_W: it is 0 in every input set" in note["text"] for note in answer["notes"])
     refused = doe("uncertainty", scene, "--figure", "no_W", "--out", tmp_path / "other")
     assert refused.returncode == 2 and "--figure no_W: not a result of this scene; choose one of" in refused.stderr

@@ -118,8 +118,8 @@ def friction_notes(check: dict[str, Any] | None) -> Notes:
     if check is None or ratio is None or low <= ratio <= high:
         return ()
     sentence = (
-        f"power loss: {ratio:.2g} times the {check['skf_power_W']:.3g} W of SKF's friction model, outside {low:g} to {high:g}; "
-        "compare the power terms, the oil and lubricant.supply"
+        f"power loss: it is {ratio:.2g} times the {check['skf_power_W']:.3g} W of SKF's friction model, outside {low:g} to {high:g}. "
+        "Compare the power terms, the oil and lubricant.supply"
     )
     return (Note("maker-loss", sentence),)
 
@@ -278,10 +278,10 @@ def left_out_notes(scene: Scene, power_loss: float) -> Notes:
                 share = power / power_loss
                 size = f"{100.0 * share:.2g} %" if share < 1.0 else f"{share:.2g} times the simulated loss"
                 code = "omission" if share > LARGE_SHARE else "left-out"
-                sentence = f"not modelled: {item.name}. Effect: about {power:.2g} W ({size}) {item.changes}"
+                sentence = f"not modelled: {item.name}, which would cause about {power:.2g} W ({size}) {item.changes}"
                 notes.append(Note(code, sentence))
         elif item.matters is not None and item.matters(scene):
-            notes.append(Note("left-out", f"not modelled: {item.name}. Effect: {item.changes}"))
+            notes.append(Note("left-out", f"not modelled: {item.name}, which would cause {item.changes}"))
     return tuple(notes)
 
 

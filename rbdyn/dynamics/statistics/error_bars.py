@@ -313,12 +313,12 @@ def error_notes(
 
     ``tighter``: the tolerance that removes a numerical error; a tenth of the scene's unless given.
     """
-    notes = [] if fault is None else [Note("numerical-error", f"numerical error: not estimated; {fault}")]
+    notes = [] if fault is None else [Note("numerical-error", f"numerical error: it is not estimated; {fault}")]
     few = {name: figures[name].effective_samples for name in JUDGED if not _enough(figures[name])}
     if few:
         listed = ", ".join(f"{JUDGED[name]} {count:.1f}" for name, count in few.items())
         sentence = (
-            f"statistical error: uncertain because of fewer than {FEW_SAMPLES:.0f} effective samples ({listed}). "
+            f"statistical error: fewer than {FEW_SAMPLES:.0f} effective samples make it uncertain ({listed}). "
             "Raise numerics.turns or numerics.replicates"
         )
         notes.append(Note("few-samples", sentence))

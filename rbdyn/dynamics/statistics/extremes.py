@@ -101,4 +101,4 @@ def return_force_notes(runs: Sequence[Replicate]) -> Notes:
             f"the largest forces of {windows} windows do not follow Gumbel's law; lengthen numerics.impact_window_turns and "
             "numerics.turns"
         )
-    return (Note("remark", f"impact return force: not given, because {why}"),)
+    return (Note("remark", f"impact return force: it is not given, because {why}"),)
