@@ -418,7 +418,7 @@ def _lost_note(study: Problem, taken: Taken, heat: Heat) -> Note:
     why = "runs of a table keep its region where it is" if stays else "no factor moves it"
     return Note(
         "seizure",
-        f"{'Seizure' if running.seizes else 'Nearly lost'}: {words} in operation {1e6 * running.play.operating:.0f} um {taken.at}at "
+        f"{'Seizure' if running.seizes else 'Nearly lost'}: {words} in operation is {1e6 * running.play.operating:.0f} um {taken.at}at "
         f"the edge of the region, where {1e6 * taken.floor:.0f} um are its floor; {why}.",
     )
 
@@ -444,7 +444,7 @@ def _with_baseline(
         notes.append(
             Note(
                 "seizure",
-                f"Seizure: {words} of the baseline design in operation {left}{heats}; gains are over the middle of the region instead.",
+                f"Seizure: {words} of the baseline design in operation is {left}{heats}; gains are over the middle of the region instead.",
             )
         )
     return moved.with_file(baseline=baseline), notes

@@ -248,12 +248,11 @@ class PickTolerances:
         """Parts of too fine a grade, what demands them, and what letting that go would give; empty if there are none."""
         at_rim = dict(zip(self.factors, self.widest.at_rim.tolist(), strict=True))
         rim, fine = ([name for name in self.too_fine if at_rim[name] is side] for side in (True, False))
-        grade, sentences = f"IT{self.settings.finest_grade}", list[str]()
-        if fine:
-            needs = (
-                f"requires parts finer than {grade}: {self._listed(fine)}" if self.any_width else "leaves no tolerance"
-            )
-            sentences.append(f"{_requirement(self.widest.limited_by)} {needs}.")
+        grade, cause, sentences = f"IT{self.settings.finest_grade}", _requirement(self.widest.limited_by), list[str]()
+        if fine and not self.any_width:
+            sentences.append(f"{cause} leaves no tolerance.")
+        elif fine:
+            sentences.append(f"{cause} requires parts finer than {grade}: {self._listed(fine)}.")
         if fine and self.relaxed is not None:
             wider, limit = self.relaxed._listed(fine), _limit_words(self.relaxed.widest.limited_by)
             sentences.append(f"Without this requirement the tolerance could be {wider}, limited by {limit}.")
@@ -285,8 +284,7 @@ def _limit_words(limit: str) -> str:
 
 def _requirement(limit: str) -> str:
     """What parts have to do for the gain or the limit that limits the tolerances."""
-    words = _limit_words(limit)
-    return f"Keeping {words}" if limit.startswith(GAIN) else f"Meeting {words}"
+    return f"{'Keeping' if limit.startswith(GAIN) else 'Meeting'} {_limit_words(limit)}"
 
 
 def widest_tolerances_of(

@@ -136,7 +136,7 @@ def _note(key: str, value: float, low: float, high: float) -> Note:
     likely = {other: number for other, number in candidates.items() if low <= number <= high}
     other = _nearest(likely, low, high)
     fix = "check its unit" if other is None else f"if {value:g} {other} are meant, write {likely[other]:.4g}"
-    return Note("unit", f"{key} = {value:g}: outside the usual {low:.3g} to {high:.3g}; {fix}")
+    return Note("unit", f"{key} = {value:g} is outside the usual {low:.3g} to {high:.3g}; {fix}")
 
 
 def _nearest(likely: Mapping[str, float], low: float, high: float) -> str | None:
@@ -171,7 +171,7 @@ def clearance_notes(
             continue
         subject = "seizure: " if lost else ""
         sentence = (
-            f"{subject}{name} clearance in operation {1e6 * play.operating:.1f} um of {1e6 * play.drawn:.1f} um drawn: fits "
+            f"{subject}{name} clearance in operation is {1e6 * play.operating:.1f} um of {1e6 * play.drawn:.1f} um: fits "
             f"{1e6 * play.fit:+.1f}, temperature {1e6 * play.temperature:+.1f}, rotation {1e6 * play.rotation:+.1f} um; widen it or "
             "check the temperatures"
         )

@@ -96,7 +96,7 @@ def test_unit_clearances_in_operation(name, drawn, change, code):
     """Unit: nearly lost below a tenth of the drawn clearance, mostly lost, of a cage, below half."""
     notes = clearance_notes({name: OperatingClearance(drawn, 0.0, change, 0.0), "other": None})
     assert [note.code for note in notes] == ([] if code is None else [code])
-    assert all(f"{name} clearance in operation {1e6 * (drawn + change):.1f} um" in note for note in notes)
+    assert all(f"{name} clearance in operation is {1e6 * (drawn + change):.1f} um" in note for note in notes)
 
 
 def test_unit_speeds_beyond_limits():

@@ -176,7 +176,7 @@ def test_unit_the_original_design_stays_the_baseline_unless_it_seizes(tmp_path):
     moved, notes = moved_region(hot_study(tmp_path, centre=0.1, step=0.04), unheated)
     assert moved.baseline == pytest.approx(moved.centre)
     assert notes[-1].level == "danger" and notes[-1].startswith(
-        "Seizure: guide clearance of the baseline design in operation -"
+        "Seizure: guide clearance of the baseline design in operation is -"
     )
 
 
