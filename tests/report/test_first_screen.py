@@ -322,6 +322,30 @@ def test_the_verdict_names_the_gains_that_are_real(percents, said):
     assert text.splitlines()[0] == f"{said}No danger found"
 
 
+def check_warnings(text: str) -> None:
+    """Assert that all warnings of a screen are numbered behind the answer, and that no warning or note repeats another.
+
+    Two say the same where their first words and first numbers are equal.
+    """
+    assert not re.search("^warning: ", text, re.MULTILINE | re.IGNORECASE)
+    lines = text.partition("\nWarnings\n")[2].partition("\n\n")[0].splitlines()
+    numbers = [int(found[1]) for line in lines if (found := re.match(r"(\d+)\. ", line))]
+    assert len(numbers) > 1 and numbers == list(range(1, len(numbers) + 1))
+    said = [found[1] for line in lines if (found := re.match(r"(?:\d+\.|note:) (.*)", line))]
+    subjects = [
+        (tuple(re.findall("[a-z]+", each.lower())[:2]), (re.findall(r"[\d.]*\d", each) or [""])[0]) for each in said
+    ]
+    assert len(set(subjects)) == len(subjects), subjects
+
+
+@pytest.mark.parametrize("case", ["study", "study_robust", "study_adaptive"])
+def test_a_stored_screen_numbers_its_warnings_and_repeats_none(case):
+    """Golden: the screens that are kept begin with the verdict and have every warning once."""
+    text = (ROOT / "tests" / "golden" / "outputs" / case / "screen.txt").read_text("utf-8")
+    assert "No danger found; " in text.splitlines()[0]
+    check_warnings(text)
+
+
 @pytest.mark.slow
 def test_the_example_study_has_a_short_first_screen(tmp_path):
     """Command line: the shipped study improves four responses with a held cage, in at most 210 words outside tables."""
@@ -334,3 +358,4 @@ def test_the_example_study_has_a_short_first_screen(tmp_path):
     assert {gain["verdict"] for gain in answer["gains"].values()} == {"better"}
     assert answer["gains"]["pocket_impact_power_W"]["percent"] == pytest.approx(26.0, abs=2.0)
     assert text.count("(held 16/16)") == 2
+    check_warnings(text)
