@@ -88,13 +88,13 @@ class Difference(Record):
     """
 
     a: float | None = shown(
-        "A", value_alone, error="error_together", unit="of the figure", meaning="its values, and B less A"
+        "A", value_alone, error="error_together", unit="of the result", meaning="its values, and B less A"
     )
     b: float | None = shown("B", value_alone, error="error_together")
     difference: float | None = shown("B - A", cell=lambda figure: figure.words)
-    error: float | None = written("half width of the 95 % interval of this difference alone", unit="of the figure")
+    error: float | None = written("half width of the 95 % interval of this difference alone", unit="of the result")
     error_together: float | None = written(
-        "half width that holds jointly for all results of the bearing, or of the parts", unit="of the figure"
+        "half width that holds jointly for all results of the bearing, or of the parts", unit="of the result"
     )
     verdict: str = shown(
         "difference",

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 Saved = TypeVar("Saved")
 # What tables say of figures and of their errors.
-OF_FIGURE, HALF_WIDTHS = "of the figure", "half widths of the 95 % intervals"
+OF_FIGURE, HALF_WIDTHS = "of the result", "half widths of the 95 % intervals"
 
 
 class Quantity(Record):

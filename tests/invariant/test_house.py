@@ -318,18 +318,18 @@ def test_invariant_messages_are_short_sentences():
 # Shapes that make a sentence hard to read, each with the most that messages and keys, docstrings and pages may have. Counts may
 # only fall.
 SHAPES = {
-    r"\b(?:that|those) of\b": (3, 317, 0),
+    r"\b(?:that|those) of\b": (2, 317, 0),
     r"(?<![.?!] )\bwhat (?:the|a|its|it|they|is|are|was|stands?|fits|few|follows|goes)\b": (0, 145, 0),
     r", for (?:it|they|this|no|any|its|there|those|free|then)\b": (0, 14, 0),
     r"(?:^|[.!?] )So\b(?! that)|\band so (?:has|is|are|does)\b": (0, 35, 0),
     r"\b(?:is|are) no (?!longer|more|less|equilibrium|steady)\w+": (0, 54, 0),
-    r"(?:^|[.!?] )(?:It|They|This|That|These|Those) (?:is|are|has|does|can|needs?|takes?|shows?)\b": (2, 56, 0),
-    r"(?:\bof\b[^.!?]*){4}": (2, 153, 0),
-    r"(?:;[^.!?;]*){2}": (14, 154, 0),
+    r"(?:^|[.!?] )(?:It|They|This|That|These|Those) (?:is|are|has|does|can|needs?|takes?|shows?)\b": (1, 56, 0),
+    r"(?:\bof\b[^.!?]*){4}": (1, 153, 0),
+    r"(?:;[^.!?;]*){2}": (13, 154, 0),
     r"\bplay\b": (0, 17, 0),
-    r"(?<!-)\braces?\b(?!\.|-)": (3, 190, 0),
-    r"(?<![<{/-])\b[Ff]igures?\b(?![}>])": (5, 274, 0),
-    r"(?<!\.)\b[Pp]icks?\b(?! =)": (6, 204, 0),
+    r"(?<!-)\braces?\b(?!\.|-)": (2, 190, 0),
+    r"(?<![<{/-])\b[Ff]igures?\b(?![}>])": (0, 274, 0),
+    r"(?<!\.)\b[Pp]icks?\b(?! =)": (1, 204, 0),
 }
 
 
