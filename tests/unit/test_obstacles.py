@@ -268,5 +268,5 @@ def test_unit_what_to_relax_is_a_danger_ahead_of_a_worse_pick():
     assert [str(note) for note in dangers] == [
         *map(str, notes),
         "the selected design is worse",
-    ] and "56 N would be kept" in dangers[1]
+    ] and "56 N would be met" in dangers[1]
     assert [note.level for note in Obstacles(True, (missed,), [], (), {}, "", {}).notes] == [Level.WARNING] * 2
