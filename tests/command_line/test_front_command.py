@@ -114,7 +114,7 @@ def test_goals_limits_and_rule_of_the_file_are_kept(tmp_path):
         row = (line for line in shown.output.splitlines() if f"power loss [W] {sense}" in line)
         cells = next(row).partition(sense)[2].split("  ")
         assert with_error(limit["value"], limit["error"]) in [cell.strip() for cell in cells]
-    assert "power loss [W] ≤ 400" in shown.output and "demanded" in shown.output
+    assert "power loss [W] ≤ 400" in shown.output and "required" in shown.output
     assert "feasible share 0." in shown.output
 
 
