@@ -348,6 +348,6 @@ def _face(study: Problem, adaptive: Adaptive, index: int, position: float) -> Fa
 
 
 def near_limits(adaptive: Adaptive, study: Problem, limits: Sequence[Limit]) -> list[Limit]:
-    """The limits whose room is within `NEAR` of the response's range over all runs."""
+    """The limits of responses whose room is within `NEAR` of the response's range over all runs."""
     ranges = dict(zip(study.responses, np.ptp(adaptive.search.emulators.runs.values, axis=0).tolist(), strict=True))
-    return [limit for limit in limits if limit.room <= NEAR * ranges[limit.response]]
+    return [limit for limit in limits if limit.response in ranges and limit.room <= NEAR * ranges[limit.response]]

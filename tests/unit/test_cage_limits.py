@@ -5,16 +5,18 @@ from __future__ import annotations
 import json
 import re
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from instant_runs import instant_result, instantly, unillustrated
-from short_studies import short_study
+from short_studies import paper_study, short_study
 from typer.testing import CliRunner
 
 from doe.cli import app
 from doe.study_file.sections import CageLimit
-from doe.workflow.confirmation import Confirmed, class_limits, limits_of
+from doe.workflow.adaptive import near_limits
+from doe.workflow.confirmation import Confirmed, Limit, class_limits, limits_of
 from doe.workflow.problem import Problem
 from doe.workflow.robust import case_of_study
 from rbdyn.base.faults import InputError
@@ -234,3 +236,14 @@ def test_front_and_pick_stay_where_cages_keep_the_limit(tmp_path, monkeypatch, b
         )
     else:
         assert record["tried"] == 2 and record["pick"]["pocket_clearance_mm"] != picks[0] and not words
+
+
+def test_unit_a_class_is_no_response_of_the_search():
+    """Search: limits nearby are those of responses, within a share of their range over all runs; a class of the cage has no range."""
+    study = paper_study()
+    values = np.array([[80.0, 0.3, 230.0], [100.0, 0.4, 240.0]])
+    adaptive = SimpleNamespace(search=SimpleNamespace(emulators=SimpleNamespace(runs=SimpleNamespace(values=values))))
+    shared = {"bound": 90.0, "sense": "<=", "verdict": "kept", "error": None, "probability": 1.0}
+    near, far = (Limit(response="impact_force_N", value=value, **shared) for value in (89.9, 85.0))
+    cage = Limit(response="cage_held_share", value=0.943, **(shared | {"bound": 0.85, "sense": ">="}))
+    assert near_limits(adaptive, study, [near, far, cage]) == [near]
