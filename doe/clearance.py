@@ -35,8 +35,9 @@ if TYPE_CHECKING:
 
 # Module of the simulation: its code decides whether a stored run is still valid.
 SIMULATION = "rbdyn.dynamics.simulate"
-# Offsets of seeds that no design run has; the input sets are those of an uncertainty.
+# Offsets of seeds that no first design run has; the input sets are those of an uncertainty.
 CONFIRMATION_SEEDS = 1_000_000
+FURTHER_SEEDS = 2_000_000
 INPUT_SEEDS = 3_000_000
 ADAPTIVE_SEEDS = 4_000_000
 CALIBRATION_SEEDS = 5_000_000

@@ -148,7 +148,7 @@ def summary(outcome: StudyResult) -> Summary:
         obstacles=outcome.obstacles,
         tried=outcome.tries,
         edge=outcome.edge,
-        asked=Settings.of_runs(study),
+        asked=Settings.of_runs(study, outcome.runs.replicates_a_point),
         design=StudyDesign.of(study, outcome.design, outcome.runs),
         fit=fits_of(outcome.study.surfaces),
         front=SurfaceFront.of(study, outcome.front),

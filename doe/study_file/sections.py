@@ -121,6 +121,9 @@ class Design(Consistent):
     """Order of the runs. In either order the seed of a run is seed plus its place in the standard order."""
     seed: Annotated[int, Field(ge=0)] = 1
     """Seed of the design and of its runs."""
+    fewest_replicates: Annotated[int, Field(ge=2, le=10000)] = 4
+    """Replicates of each run at first, if numerics.replicates is at least twice as many and no limit names a class of the cage.
+    Effect: all runs get the other replicates only if noise is more than a tenth of the variance of a predicted response."""
 
     @property
     def centres(self) -> int:

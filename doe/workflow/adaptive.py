@@ -17,7 +17,7 @@ from doe.adaptive import Runs as SearchRuns
 from doe.adaptive.emulators import Region
 from doe.adaptive.search import NEAR, Face, check_budget
 from doe.clearance import Simulations
-from doe.duty import Run, main_scene, scenes_of
+from doe.duty import Run, scenes_of
 from doe.pareto.front import NOISE_DRAWS, Samples, SimulatedFront, noisy_hypervolume
 from doe.pareto.search import InfeasibleError, hypervolume, non_dominated
 from doe.running.runner import Progress
@@ -25,8 +25,8 @@ from doe.running.store import Failure, grouped
 from doe.workflow.confirmation import Limit
 from doe.workflow.front import named_faults
 from doe.workflow.problem import Problem
+from doe.workflow.replication import independent_values, standard_errors
 from doe.workflow.runs import Runs
-from doe.workflow.surfaces import independent_values, standard_errors
 from rbdyn.base.arrays import Array, Whole, one_thread
 from rbdyn.base.faults import InputError, MethodError, RunError, refuse
 from rbdyn.base.records import Record
@@ -96,9 +96,9 @@ def check_adaptive(study: Problem) -> None:
 
 
 def plan_of(study: Problem) -> Plan:
-    """Settings of the search; a fresh run at a finalist has the replicates of a design run."""
+    """Settings of the search; a fresh run at a finalist has all replicates of the scene."""
     settings = study.file.adaptive
-    usual = main_scene(study.design_scenes(study.baseline[None])[0]).numerics.replicates
+    usual = study.usual_replicates
     return Plan(settings.budget, settings.batch, settings.seed, usual=usual, pick=study.file.front.pick)
 
 
@@ -109,7 +109,7 @@ def find_adaptive(study: Problem, runs: Runs, simulations: Simulations) -> Adapt
     Raises RunError if the runs of a stage fail, InputError for impossible settings or limits, KeyboardInterrupt.
     """
     plan, goals, start_s = plan_of(study), study.goals, time.perf_counter()
-    first_runs = _design_runs(study, runs, plan)
+    first_runs = _design_runs(study, runs)
     evaluator = _PointEvaluator(study, simulations, plan.budget - len(first_runs.points))
     region = region_in_units(study)
     step = study.half_ranges
@@ -236,10 +236,10 @@ class _PointEvaluator(Evaluator):
         return values, standard_errors(errors, samples), np.maximum(samples - 1, 0)
 
 
-def _design_runs(study: Problem, runs: Runs, plan: Plan) -> SearchRuns:
+def _design_runs(study: Problem, runs: Runs) -> SearchRuns:
     """The runs of the design as samples of the search."""
     number = independent_values(runs)
-    errors, replicates = standard_errors(runs.errors, number), np.full(len(runs.coded), plan.usual)
+    errors, replicates = standard_errors(runs.errors, number), np.full(len(runs.coded), runs.replicates_a_point)
     return SearchRuns(runs.coded / study.reach, runs.values, errors, np.maximum(number - 1, 0), replicates)
 
 

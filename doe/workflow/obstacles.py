@@ -40,7 +40,8 @@ from doe.workflow.confirmation import (
 from doe.workflow.front import tolerances_out_of_reach
 from doe.workflow.pick import SearchedPick, place_of, sides_of
 from doe.workflow.problem import Problem
-from doe.workflow.surfaces import predict_all, quadratics, standard_errors
+from doe.workflow.replication import standard_errors
+from doe.workflow.surfaces import predict_all, quadratics
 from doe.workflow.tolerances import PickTolerances
 from rbdyn.base.arrays import Array, Mask
 from rbdyn.base.faults import InputError

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
-from doe.clearance import ADAPTIVE_EXTENDED, ADAPTIVE_SEEDS, CONFIRMATION_SEEDS, points_of, responses_of
+from doe.clearance import ADAPTIVE_EXTENDED, ADAPTIVE_SEEDS, CONFIRMATION_SEEDS, FURTHER_SEEDS, points_of, responses_of
 from doe.designs import Design
 from doe.duty import Duty, DutyScenes, Run, main_scene, scenes_of
 from doe.study_file import Study
@@ -223,6 +223,32 @@ class Problem(Study):
         labels = [f"design run {run}" for run in range(1, len(actual) + 1)]
         return RunPlan(design, actual, scenes, labels, [self.by_factor(point) for point in actual])
 
+    def _design_run(self, point: Array, seed: int, replicates: int | None = None) -> Run:
+        """Scenes of a design run, with all their replicates unless another number is given."""
+        effort = [] if replicates is None else [f"numerics.replicates={replicates}"]
+
+        def scene(overrides: Sequence[str]) -> Scene:
+            return self._scene_in_region(point, seed, [*overrides, *effort])
+
+        return self._begun(self.over_duty(scene, self.baseline_scenes))
+
+    @cached_property
+    def usual_run(self) -> Run:
+        """A design run at the baseline with all its replicates."""
+        return self._design_run(self.baseline, self.file.design.seed)
+
+    @property
+    def usual_replicates(self) -> int:
+        """Replicates of a design run that has all; over a duty, at the point with the largest share of the time."""
+        return main_scene(self.usual_run).numerics.replicates
+
+    @cached_property
+    def first_replicates(self) -> int:
+        """Replicates of a design run at first: all of them where few are more than half, or where a class of the cage needs all."""
+        fewest, usual = self.file.design.fewest_replicates, self.usual_replicates
+        alike = all(scene.numerics.replicates == usual for scene in scenes_of(self.usual_run))
+        return fewest if alike and 2 * fewest <= usual and not self.file.limits.classes else usual
+
     def assignments(self, factors: Array) -> list[str]:
         """Overrides "key=value" of the scene at factor values (k,)."""
         numbers = zip(self.file.factor, map(float, factors), strict=True)
@@ -311,18 +337,16 @@ class Problem(Study):
         run = self.over_duty(partial(self._confirmation_scene, self.baseline))
         return dict(run.scenes) if isinstance(run, DutyScenes) else {}
 
-    def design_scenes(self, points: Array, order: Sequence[int] | None = None) -> list[Run]:
+    def design_scenes(self, points: Array, order: Sequence[int] | None = None, further: bool = False) -> list[Run]:
         """Scenes of the design runs (n, k); runs at one point differ only by their seed.
 
-        ``order``: place of each run in the standard order, which sets its seed; by default the order of the points. Raises
-        InputError, which names the point with an impossible value of a factor.
+        ``order``: place of each run in the standard order, which sets its seed; by default the order of the points. ``further``: those
+        of the replicates that the first runs left out. Raises InputError, which names the point with an impossible value of a factor.
         """
-        first, places = self.file.design.seed, range(len(points)) if order is None else order
-        runs = zip(places, points, strict=True)
-        return [
-            self._begun(self.over_duty(partial(self._scene_in_region, point, first + place), self.baseline_scenes))
-            for place, point in runs
-        ]
+        seed, places = self.file.design.seed + FURTHER_SEEDS * further, range(len(points)) if order is None else order
+        first, usual = self.first_replicates, self.usual_replicates
+        count = None if first == usual else usual - first if further else first
+        return [self._design_run(point, seed + place, count) for place, point in zip(places, points, strict=True)]
 
     def _begun(self, run: Run) -> Run:
         """The run with heat balances that begin from those in the middle of the region, where they are known."""
@@ -513,20 +537,22 @@ class Settings(Asked):
     scene_file: str
     scene: dict[str, Any]
     replicates: int
+    design_replicates: int
     turns: float
     confirmation_replicates: int
 
     @classmethod
-    def of_runs(cls, study: Problem) -> Self:
-        """What a study with a scene states."""
-        scene, asked = main_scene(study.design_scenes(study.baseline[None])[0]), Asked.of(study)
+    def of_runs(cls, study: Problem, design_replicates: int) -> Self:
+        """What a study with a scene states, and the replicates of its design runs."""
+        scene, asked = main_scene(study.usual_run), Asked.of(study)
         return cls(
             factors=asked.factors,
             responses=asked.responses,
             study_file=study.path.name,
             scene_file=study.scene.file,
             scene=scene.model_dump(mode="json", exclude_none=True),
-            replicates=scene.numerics.replicates,
+            replicates=study.usual_replicates,
+            design_replicates=design_replicates,
             turns=scene.numerics.turns,
             confirmation_replicates=study.file.confirmation.replicates,
         )

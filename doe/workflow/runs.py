@@ -40,7 +40,7 @@ class Runs:
     values of each half-width (0: unknown; None: all unknown). ``block`` (n,) labels each run; None: one block.
     ``failures``: failed design runs, which are not in the arrays. ``turns``: shaft turns of all runs. ``at_points``: by
     point of the duty, the same runs with the figures of the simulation there as responses; empty without a duty. ``design``: of
-    simulated runs, with those added in place of failed ones. ``cages_missed`` (n,): whether most replicates have a cage of no class that
+    simulated runs, with those added in place of failed ones. ``replicates_a_point``: replicates of each simulated run. ``cages_missed`` (n,): whether most replicates have a cage of no class that
     the study allows; None where that is so at no run or at all.
     """
 
@@ -56,6 +56,7 @@ class Runs:
     at_points: Mapping[str, "Runs"] = field(default_factory=dict)
     design: Design | None = None
     cages_missed: Mask | None = None
+    replicates_a_point: int = 0
 
     @property
     def places(self) -> list[int]:
@@ -91,7 +92,11 @@ def run_design(study: Problem, simulations: clearance.Simulations, progress: Pro
     if failures and (lacking := _lacking(study, design, rows)):
         raise RunError(f"only {len(rows)} of {len(results)} design runs succeeded{lacking}: {sentence(failures)}")
     sound = [result for result in results if not isinstance(result, Failure)]
-    notes = _distinct_notes([result.notes for result in sound])
+    few = study.first_replicates < study.usual_replicates
+    # Whether few replicates suffice is judged by what the surfaces make of them.
+    notes = _distinct_notes(
+        [[note for note in result.notes if not few or note.code != "few-samples"] for result in sound]
+    )
     if failures:
         added = len(results) - planned
         instead = (
@@ -120,6 +125,7 @@ def run_design(study: Problem, simulations: clearance.Simulations, progress: Pro
         turns=simulations.turns,
         design=design,
         cages_missed=missed,
+        replicates_a_point=study.first_replicates,
     )
     at_points = {}
     for name in study.shares:
@@ -193,7 +199,7 @@ def with_remaining(study: Problem, runs: Runs) -> Problem:
     return replace(study, remaining=Remaining(runs.coded[~missed], np.vstack([lost, runs.coded[missed]])))
 
 
-def _distinct_notes(notes: Sequence[Notes]) -> list[Note]:
+def _distinct_notes(notes: Sequence[Sequence[Note]]) -> list[Note]:
     """Notes of all runs in the order of their mean place in a run, the most important first.
 
     Of notes that differ in their numbers only the first is kept, with the number of its runs. A danger of some of them is none

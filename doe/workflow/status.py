@@ -15,7 +15,7 @@ from typing import Any, get_args
 
 from doe import clearance
 from doe.clearance import every_scene, points_of, work_of
-from doe.duty import Run, main_scene, scenes_of
+from doe.duty import Run, scenes_of
 from doe.running.runner import ANSWER, Agenda, Stage, agendas_of
 from doe.running.store import STORE, CurrentRun, EndedRun, Failure, Point, RunResult, Store, folders_of, grouped
 from doe.study_file.sections import Front
@@ -38,16 +38,17 @@ def study_stages(study: Problem, adaptive: bool = False, robust: bool = False) -
     The most runs of a stage include the further points that a broken limit may need.
     """
     works = dict(design_works(study))
+    most_runs = None if study.first_replicates == study.usual_replicates else 2 * len(works)
     confirmation = study.confirmation_run(study.baseline)
     stages = [
         _stage_of(BASELINE, 1, confirmation, BASELINE, fewest=1),
-        Stage(DESIGN, (DESIGN,), len(works), sum(works.values())),
+        Stage(DESIGN, (DESIGN,), len(works), sum(works.values()), most=most_runs),
         Stage(FRONT),
     ]
     if adaptive:
         from doe.adaptive.search import FRESH
 
-        usual = main_scene(study.design_scenes(study.baseline[None])[0]).numerics.replicates
+        usual = study.usual_replicates
         (search,) = study.adaptive_scenes(study.baseline[None], [usual], 0)
         settings = study.file.adaptive
         runs = max(settings.budget - len(study.design.coded), 0)

@@ -25,6 +25,7 @@ from doe.response_surface.least_squares import backward, forward, slope
 from doe.study_file.study import Fitted
 from doe.study_file.table import read_sheet
 from doe.workflow.problem import Problem
+from doe.workflow.replication import independent_values, standard_errors
 from doe.workflow.runs import Runs, read_runs
 from rbdyn.base.arrays import Array, Rows, Whole, one_thread
 from rbdyn.base.faults import InputError, MethodError, refuse
@@ -106,23 +107,6 @@ def unrivalled(surfaces: Sequence[Surface]) -> list[Note]:
         f"{runs} runs are not compared with an alternative: a Gaussian process of more than {MOST_RIVALLED} is too slow"
     )
     return [Note("remark", sentence)] if runs > MOST_RIVALLED else []
-
-
-def independent_values(runs: Runs) -> Whole:
-    """Number of independent values (n, m) of each half width, from ``runs.replicates``; 0: unknown."""
-    samples = np.zeros(len(runs.values)) if runs.replicates is None else np.asarray(runs.replicates)
-    per_response = samples if samples.ndim == 2 else samples[:, None]
-    return np.array(np.broadcast_to(per_response, runs.values.shape), np.int64)
-
-
-def standard_errors(half_widths: Array, number: Whole) -> Array:
-    """Standard errors of means from the half widths (n, m) of their 95 % intervals.
-
-    The quantile is Student's with ``number`` - 1 degrees of freedom, where ``number`` (n, m) counts the independent
-    values of each mean; for unknown numbers (0) it is the normal one.
-    """
-    student = special.stdtrit(np.maximum(number - 1, 1), 0.975)
-    return half_widths / np.where(number > 1, student, special.ndtri(0.975))
 
 
 class Effect(Record):

@@ -47,8 +47,9 @@ from doe.workflow.parts import Made, grade_of_parts
 from doe.workflow.pick import Edge, SearchedPick, Selection, choose, draws_about, edge_of, neighbourhood
 from doe.workflow.problem import Problem
 from doe.workflow.region import region_that_runs
+from doe.workflow.replication import run_by_need
 from doe.workflow.robust import Robust, check_robust, judge
-from doe.workflow.runs import Runs, run_design, with_remaining
+from doe.workflow.runs import Runs, with_remaining
 from doe.workflow.status import DESIGN, FRONT, STEPS_S, TOLERANCES, inputs_digest, shorter_by, study_stages
 from doe.workflow.surfaces import PublishedComparison, compare_with_published, fit_surfaces, reference_runs, with_rivals
 from doe.workflow.tolerances import PickTolerances, widest_tolerances_of
@@ -389,7 +390,7 @@ def run_study(
         original = simulate_original(study, simulations)
         clock.lap("baseline_s")
         watched = first_look(study, folder, original, simulations.progress(DESIGN), effort.notice)
-        runs = run_design(study, simulations, watched)
+        runs = run_by_need(study, simulations, watched, effort.notice)
         clock.lap("design_s", FRONT)
         study, turns = with_remaining(study, runs), runs.turns
         study, surface_front = _surfaces_and_front(study, runs, clock)

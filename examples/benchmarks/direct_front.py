@@ -29,9 +29,10 @@ from doe.workflow.adaptive import Evaluator
 from doe.workflow.effort import Effort
 from doe.workflow.front import find_front
 from doe.workflow.problem import Problem
+from doe.workflow.replication import standard_errors
 from doe.workflow.runs import run_design
 from doe.workflow.surface_front import EstimatedPoint
-from doe.workflow.surfaces import fit_surfaces, standard_errors
+from doe.workflow.surfaces import fit_surfaces
 from rbdyn.base.arrays import Array
 from rbdyn.base.command import progress_bar
 from rbdyn.base.faults import InputError, MethodError, RunError

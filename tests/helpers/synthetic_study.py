@@ -147,6 +147,7 @@ def summary() -> dict[str, Any]:
                  "transform": "none", "name": name} for name in RESPONSES
             ],
             "replicates": 8,
+            "design_replicates": 8,
             "turns": 40,
             "confirmation_replicates": 16,
         },

@@ -345,7 +345,7 @@ def settings(summary: Summary, motion: Mapping[str, Any]) -> Section:
     """Factors, responses and scene as the study states them."""
     asked = summary.asked
     effort = (
-        f"{shown(asked.replicates)} replicates per design run, {shown(asked.turns)} counted shaft turns per replicate, "
+        f"{shown(asked.design_replicates)} replicates per design run, {shown(asked.turns)} counted shaft turns per replicate, "
         f"{shown(asked.confirmation_replicates)} replicates per confirmed point"
     )
     rows = [

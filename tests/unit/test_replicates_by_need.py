@@ -1,0 +1,125 @@
+"""Design runs have few replicates at first, and all of them where noise would be much of what the surfaces predict."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import replace
+
+import instant_runs
+import numpy as np
+import pytest
+from instant_runs import instant_result, instantly
+from scipy import stats
+from short_studies import paper_study, short_study
+
+from doe.clearance import FURTHER_SEEDS
+from doe.study_file.sections import OtherLimits
+from doe.workflow import whole
+from doe.workflow.effort import Effort
+from doe.workflow.problem import Problem, Settings
+from doe.workflow.replication import NOISY, noisy
+from doe.workflow.runs import Runs
+from doe.workflow.status import study_stages, study_status
+
+EIGHT = "turns=3,discard_turns=1,replicates=8,companion=false,impact_window_turns=1"
+TERMS, RUNS = 10, 20  # of a quadratic model and of the design of the example, whose impact has a linear model
+
+
+def with_replicates(usual: int) -> Problem:
+    """The example study with the goals of its paper and another number of replicates."""
+    study = paper_study()
+    return study.with_file(scene=study.scene.model_copy(update={"set": [f"numerics.replicates={usual}"]}))
+
+
+@pytest.mark.parametrize(("usual", "first"), [(8, 4), (16, 4), (7, 7), (4, 4), (2, 2)])
+def test_unit_few_replicates_are_at_most_half(usual, first):
+    """Plan: runs have the fewest replicates at first where these are at most half of the scene's; further runs have the others."""
+    study = with_replicates(usual)
+    assert study.first_replicates == first
+    firsts = study.plan.scenes
+    assert {scene.numerics.replicates for scene in firsts} == {first}
+    (stage,) = [stage for stage in study_stages(study) if stage.name == "design runs"]
+    assert (stage.runs, stage.most) == (RUNS, None if first == usual else 2 * RUNS)
+    assert Settings.of_runs(study, first).replicates == usual
+    if first < usual:
+        further = study.design_scenes(study.plan.actual, study.design.order.tolist(), further=True)
+        assert {scene.numerics.replicates for scene in further} == {usual - first}
+        seeds = [[scene.numerics.seed for scene in scenes] for scenes in (firsts, further)]
+        assert np.ptp(np.subtract(*seeds)) == 0 and seeds[1][0] - seeds[0][0] == FURTHER_SEEDS
+        excluded = {"numerics": {"replicates", "seed"}}
+        assert [s.model_dump(exclude=excluded) for s in firsts] == [s.model_dump(exclude=excluded) for s in further]
+
+
+def test_unit_a_class_of_the_cage_needs_all_replicates():
+    """Plan: whether a design run has a class of the cage is judged by all its replicates."""
+    study = with_replicates(8)
+    limited = study.with_file(limits=OtherLimits.model_validate({"cage": {"verdict": "held"}}))
+    assert (study.first_replicates, limited.first_replicates) == (4, 8)
+
+
+def test_unit_noise_of_predictions():
+    """Noise: predictions at the runs have p/n of the variance of a run's noise; responses without goal or limit do not count."""
+    study, random = with_replicates(8), np.random.default_rng(1)
+    coded = study.design.coded
+    spread = random.normal(100.0, 1.0, (RUNS, 3))
+    replicates = np.full(spread.shape, 1_000_000)
+    for column, terms in ((0, 4), (1, TERMS)):
+        for share in (0.95 * NOISY, 1.05 * NOISY):
+            errors = np.zeros(spread.shape)
+            errors[:, column] = 1.96 * np.sqrt(share * RUNS / terms * spread[:, column].var(ddof=1))
+            runs = Runs(coded, coded, spread, errors, replicates=replicates)
+            assert noisy(study, runs) == [study.responses[column]] * (share > NOISY)
+    goalless = [each.model_copy(update={"goal": "none"}) for each in study.file.response]
+    assert not noisy(study.with_file(response=goalless), runs)
+    assert noisy(study, replace(runs, errors=np.full(spread.shape, np.nan))) == study.responses
+    # The share itself, by drawing: the fitted values of pure noise.
+    matrix = np.column_stack(
+        [np.ones(RUNS), coded, coded**2, *(coded[:, i] * coded[:, j] for i, j in ((0, 1), (0, 2), (1, 2)))]
+    )
+    hat = matrix @ np.linalg.pinv(matrix)
+    fitted = random.normal(size=(20_000, RUNS)) @ hat.T
+    assert (fitted**2).mean() == pytest.approx(TERMS / RUNS, rel=0.02)
+
+
+@pytest.mark.parametrize(("scatter", "counts"), [(0.01, {4: RUNS}), (0.2, {4: RUNS, 12: RUNS})])
+def test_unit_noisy_runs_continue(tmp_path, monkeypatch, scatter, counts):
+    """Study: quiet runs keep their few replicates; noisy ones get the others, and values and errors are those of all."""
+    ran, heard = Counter[int](), list[str]()
+
+    def result(scene):
+        if (
+            scene.numerics.seed % 1_000_000 < 100
+            and scene.numerics.turns == 3
+            and scene.numerics.seed // 1_000_000 != 1
+        ):
+            ran[scene.numerics.replicates] += 1
+        made = instant_result(scene)
+        count = scene.numerics.replicates
+        # Scattered by the seed, as half-widths of that many values.
+        half_width = scatter * stats.t.ppf(0.975, count - 1) / np.sqrt(count)
+        figures = {
+            name: replace(figure, statistical_error=half_width * figure.value, degrees_of_freedom=count - 1)
+            for name, figure in made.figures.items()
+        }
+        return replace(made, figures=figures, cost={})
+
+    instantly(monkeypatch.setattr)
+    monkeypatch.setattr(instant_runs, "instant_result", result)
+    study = Problem.load(short_study(tmp_path, EIGHT.replace("8", "16")))
+    answer = whole.run_study(study, tmp_path, Effort(2, notice=heard.append))
+    continued = 12 in counts
+    assert ran == counts
+    assert sum("all runs continue to 16" in sentence for sentence in heard) == continued
+    assert answer.runs.replicates_a_point == (16 if continued else 4)
+    assert study_status(study, tmp_path)["points"]["done"] == RUNS
+    assert sum("effective samples" in note for note in answer.runs.notes) == 0
+    if not continued:
+        return
+    scenes = [study.plan.scenes, study.design_scenes(study.plan.actual, study.design.order.tolist(), further=True)]
+    firsts, furthers = ([result(scene).figures["power_loss_W"].value for scene in each] for each in scenes)
+    column = study.responses.index("power_loss_W")
+    means = (4.0 * np.array(firsts) + 12.0 * np.array(furthers)) / 16.0
+    np.testing.assert_allclose(answer.runs.values[:, column], means, rtol=1e-12)
+    # Nearly the half-width of all replicates together; the freedom of Welch is a little less than 15.
+    ratio = answer.runs.errors[:, column] / means / (scatter * stats.t.ppf(0.975, 15) / 4.0)
+    assert np.all((ratio > 0.97) & (ratio < 1.05))
