@@ -30,6 +30,8 @@ from rbdyn.verdict.replicates import CageVerdict
 # Key of the only scene of a study without a duty.
 EVERYWHERE = ""
 WHIRL = "whirl_deviation_ratio"
+# Beginning of the names of points that were simulated as the pick.
+TRY = "try_"
 # Verdicts on gains: the first is good news, the others are not.
 REAL, LOSS, NOISE = ("real, more than its error", "a real loss, more than its error", "not significant")
 
@@ -159,19 +161,27 @@ def confirm(
 ) -> tuple[dict[str, Confirmed], list[Failure]]:
     """Simulate the choices with fresh seeds. Returns the simulated points, the ``baseline`` first, and the failures.
 
-    Raises LostPickError where the pick cannot be simulated, InputError, KeyboardInterrupt.
+    All but the pick and its tries are simulated in brief; their numerical errors are those of the baseline in proportion. Raises LostPickError where the pick cannot be simulated, InputError, KeyboardInterrupt.
     """
-    runs = [study.confirmation_run(choice.point) for choice in choices.values()]
+    brief = [name for name in choices if name != "pick" and not name.startswith(TRY)]
+    runs = [study.confirmation_run(choice.point, in_brief=name in brief) for name, choice in choices.items()]
     results = simulations.run(runs, list(choices), simulations.progress("confirmation"))
     confirmed, failures = {"baseline": baseline}, []
     for (name, choice), result in zip(choices.items(), results, strict=True):
         if not isinstance(result, Failure):
-            confirmed[name] = confirmed_from(study, choice, result)
+            found = confirmed_from(study, choice, result)
+            confirmed[name] = replace(found, numerical=_in_proportion(baseline, found)) if name in brief else found
         elif name == "pick":
             raise LostPickError(f"confirmation of the {point_words(name)}{str(result).removeprefix(name)}")
         else:
             failures.append(result)
     return confirmed, failures
+
+
+def _in_proportion(known: Confirmed, found: Confirmed) -> Array:
+    """Numerical half-widths (m,) at a point by those at another one, whose share of the values they have."""
+    shares = np.divide(found.values, known.values, out=np.ones_like(found.values), where=known.values != 0.0)
+    return known.numerical * np.abs(shares)
 
 
 def confirmed_from(study: Problem, choice: Choice, result: SimulationResult | DutyResult) -> Confirmed:

@@ -22,6 +22,7 @@ from doe.running.store import Failure
 from doe.workflow.adaptive import Adaptive, emulator_draws
 from doe.workflow.confirmation import (
     ORDER,
+    TRY,
     Choice,
     Confirmed,
     Limit,
@@ -229,7 +230,7 @@ def choose(
     points = choices(study, front, searched, candidate)
     for number, (point, _, _) in enumerate(trials, 1):
         if point is not pick:
-            points[f"try_{number}"] = Choice(point.point, f"try {number} for the selected design: {point.reason}")
+            points[f"{TRY}{number}"] = Choice(point.point, f"try {number} for the selected design: {point.reason}")
     points["pick"] = Choice(pick.point, pick.reason)
     confirmed, failures = confirm(study, baseline, points, simulations)
     return Selection(front, candidate, confirmed, failures, len(trials))

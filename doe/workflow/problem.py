@@ -370,17 +370,19 @@ class Problem(Study):
                 ]
             ) from None
 
-    def confirmation_run(self, point: Array) -> Run:
-        """Scenes of a confirmation run: more replicates, fresh seeds."""
-        return self.over_duty(partial(self._confirmation_scene, point), self.baseline_scenes, baseline_errors=True)
+    def confirmation_run(self, point: Array, *, in_brief: bool = False) -> Run:
+        """Scenes of a confirmation run: more replicates and companions, fresh seeds; ``in_brief`` as few replicates as a design run, alone."""
+        scene = partial(self._confirmation_scene, point, in_brief=in_brief)
+        return self.over_duty(scene, self.baseline_scenes, baseline_errors=True)
 
     def confirmation_scene(self, point: Array) -> Scene:
         """Scene of a confirmation run; over a duty, that at the point with the largest share of the time."""
         return main_scene(self.confirmation_run(point))
 
-    def _confirmation_scene(self, point: Array, sets: Sequence[str]) -> Scene:
+    def _confirmation_scene(self, point: Array, sets: Sequence[str], in_brief: bool = False) -> Scene:
         settings, seed = self.file.confirmation, self.file.design.seed + CONFIRMATION_SEEDS
-        effort = [f"numerics.replicates={settings.replicates}", "numerics.companion=true"]
+        replicates = min(self.usual_replicates, settings.replicates) if in_brief else settings.replicates
+        effort = [f"numerics.replicates={replicates}", f"numerics.companion={str(not in_brief).lower()}"]
         scene = self.scene_at(point, seed, [*sets, *effort, *settings.set], confirms=True)
         needed = scene.verdict.limits.fewest_replicates
         if self.file.limits.classes and settings.replicates < needed:

@@ -15,6 +15,7 @@ from short_studies import paper_study, short_study
 from doe.clearance import FURTHER_SEEDS
 from doe.study_file.sections import OtherLimits
 from doe.workflow import whole
+from doe.workflow.confirmation import Choice, confirm, confirmed_from
 from doe.workflow.effort import Effort
 from doe.workflow.problem import Problem, Settings
 from doe.workflow.replication import NOISY, noisy
@@ -123,3 +124,34 @@ def test_unit_noisy_runs_continue(tmp_path, monkeypatch, scatter, counts):
     # Nearly the half-width of all replicates together; the freedom of Welch is a little less than 15.
     ratio = answer.runs.errors[:, column] / means / (scatter * stats.t.ppf(0.975, 15) / 4.0)
     assert np.all((ratio > 0.97) & (ratio < 1.05))
+
+
+def test_unit_other_points_are_confirmed_in_brief():
+    """Confirmation: the pick and its tries have all replicates and companions; other points those of a design run, and the numerical
+    errors of the baseline in proportion."""
+    study = with_replicates(8)
+    full, brief = (study.confirmation_run(study.centre, in_brief=brief).numerics for brief in (False, True))
+    assert (full.replicates, full.companions) == (study.file.confirmation.replicates, 4)
+    assert (brief.replicates, brief.companions, brief.seed) == (8, 0, full.seed)
+
+    class Runs:
+        def progress(self, title):
+            return None
+
+        def run(self, scenes, labels, progress):
+            return [replace(instant_result(scene), replicates=scene.numerics.replicates) for scene in scenes]
+
+    baseline = confirmed_from(study, Choice(study.baseline, ""), instant_result(study.confirmation_run(study.baseline)))
+    baseline = replace(baseline, numerical=np.array([1.0, 0.01, 2.0]))
+    other = study.centre + study.step
+    names = {name: Choice(other, "") for name in ("pick", "desirability", "try_1")}
+    points, failures = confirm(study, baseline, names, Runs())
+    assert not failures
+    assert {name: point.result.replicates for name, point in points.items() if name != "baseline"} == {
+        "pick": 16,
+        "desirability": 8,
+        "try_1": 16,
+    }
+    assert np.isnan(points["pick"].numerical).all()
+    expected = baseline.numerical / baseline.values
+    np.testing.assert_allclose(points["desirability"].numerical / points["desirability"].values, expected, rtol=1e-12)
