@@ -1,7 +1,8 @@
 """The steps of a study, and the whole study that joins them.
 
 - ``problem``: a study resolved once, with its goals, region and scenes, for every step, and what it asks
-- ``region``: where its bearings run; ``design``: its points; ``runs``: its runs
+- ``region``: where its bearings run; ``design``: its points; ``runs``: its runs; ``replication``: their
+  replicates by need
 - ``surfaces``: fits, predictions, random draws, a published table; ``front``: tolerances, the front on surfaces, back-off from
   limits, with ``surface_front`` as its record; ``adaptive``: the front by emulators, with ``search_record``
 - ``pick``: the point of the front, the edge of the region; ``tolerances``: its widest ones
