@@ -45,7 +45,7 @@ def measure(
         raise InputError([f"--part {name}: is none; the parts are {', '.join(commands)}" for name in unknown])
     old = path.read_text(encoding="utf-8") if path.exists() else ""
     today = date.today().isoformat()
-    blocks = {name: _kept(old, name, f"not run for the page of {today}") for name in commands}
+    blocks = kept_blocks(old, commands)
     found: dict[str, dict[str, Any]] = {name: {"status": "kept"} for name in commands}
     _write(path, whole, blocks)  # before hours of running, lest there be no such folder
     for name in [name for name in commands if name in wanted or not wanted]:
@@ -78,13 +78,21 @@ def _page(whole: Mapping[str, Any], blocks: Mapping[str, str]) -> str:
     return "\n".join(sections)
 
 
+def kept_blocks(page: str, names: Collection[str]) -> dict[str, str]:
+    """What the page tells of these parts; those that were not measured today say so."""
+    today = date.today().isoformat()
+    new = {name for name in names if f"<!-- {name} -->\n*Measured {today};" in page}
+    return {name: _kept(page, name, "" if name in new else f"not run for the page of {today}") for name in names}
+
+
 def _kept(page: str, name: str, why: str) -> str:
-    """What the page tells of a part, with its date in the first line, and ``why`` it is not from today."""
+    """What the page tells of a part, with its date in the first line, and ``why`` it is not from today, empty where it is."""
     found = re.search(f"<!-- {name} -->\n(.*?)<!-- /{name} -->\n", page, re.DOTALL)
     if found is None or found[1] == NEVER:
         return NEVER
     first, _, rest = re.sub(r"\*Kept: .*\*\n", "", found[1]).partition("\n")
-    return f"{first}\n*Kept: {' '.join(why.split())}.*\n{rest}"
+    kept = f"*Kept: {' '.join(why.split())}.*\n" if why else ""
+    return f"{first}\n{kept}{rest}"
 
 
 def _told(line: str, folder: str, progress: Reporter) -> str:
