@@ -446,7 +446,7 @@ def _temperatures(nodes: dict[str, float], thermal: dict[str, Any]) -> list[str]
     ways = ", ".join(f"{way} {heat:.4g} W" for way, heat in thermal["carried_off_W"].items() if heat != 0.0)
     clearance, angle = thermal["clearance_um"], thermal["unloaded_angle_deg"]
     return [
-        f"temperatures [°C], with 5 to 95 % of the unknown inputs: {parts}; gain of the loop {thermal['gain']:.2g}",
+        f"temperatures [°C], with 5 to 95 % of the unknown inputs: {parts}; thermal loop gain {thermal['gain']:.2g}",
         f"heat by SKF's friction model: {sum(friction.values()):.4g} W, rolling {friction['rolling']:.4g} and sliding "
         f"{friction['sliding']:.4g}; removed by {ways}",
         f"clearance in operation {clearance['operating']:.4g} µm of {clearance['drawn']:.4g} drawn, unloaded contact angle "

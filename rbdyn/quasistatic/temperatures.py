@@ -350,7 +350,7 @@ def with_temperatures(
     last, slopes = search.last, search.slopes
     found: Heat = last.run
     nodes = dict(zip(NODES, last.temperatures.tolist(), strict=True))
-    status, reason = str(search.status), f"{search.reason}; gain of the loop {gain(slopes):.2g}"
+    status, reason = str(search.status), f"{search.reason}; thermal loop gain {gain(slopes):.2g}"
     if status == "steady":
         status, reason = ceiling_verdict(scene, nodes)
     hot = solve(at_temperatures(scene, Temperatures(**nodes)))

@@ -178,10 +178,10 @@ def _judged(states: tuple[State, ...], measured: tuple[Array, float], status: St
     slopes, error = measured
     largest = gain(slopes)
     if largest - error >= 1.0:
-        words = f"the gain of the loop is {largest:.2g}, so heat grows faster with temperature than it is removed"
+        words = f"the thermal loop gain is {largest:.2g}, so heat grows faster with temperature than it is removed"
         return Search("no steady state", states, slopes, f"{reason}; {words}" if reason else words)
     if largest >= 1.0 and status == "steady":
-        reason = f"the gain of the loop is {with_error(largest, error)}, so the state may be unstable; lengthen numerics.turns"
+        reason = f"the thermal loop gain is {with_error(largest, error)}, so the state may be unstable; lengthen numerics.turns"
         return Search("undecided", states, slopes, reason)
     return Search(status, states, slopes, reason)
 

@@ -106,11 +106,11 @@ def test_unit_a_failed_balance_is_a_failed_run(status, monkeypatch, tmp_path):
 
     def simulate(scene, *rest, **more):
         calls.append(scene)
-        return hot_result(scene, status, "the gain of the loop is 1.3")
+        return hot_result(scene, status, "the thermal loop gain is 1.3")
 
     monkeypatch.setattr(simulation, "simulate", simulate)
     outcome = clearance.attempt(scene)
-    assert outcome.result is None and outcome.cause == f"{status}: the gain of the loop is 1.3"
+    assert outcome.result is None and outcome.cause == f"{status}: the thermal loop gain is 1.3"
     with Store(tmp_path / "runs.sqlite", "study") as store:
         simulations = Simulations(store, 1, None, False, lambda title: silent)
         for _ in range(2):

@@ -127,7 +127,7 @@ def test_unit_runaway_has_no_steady_state():
     is one only within their error do not show that."""
     balance, _ = _balance(lambda state: HEAT * 2.0 ** ((state[2] - 60.0) / 10.0))
     search = steady_state(balance, COLD, COLD, _as_estimated)
-    assert search.status == "no steady state" and "gain of the loop" in search.reason
+    assert search.status == "no steady state" and "thermal loop gain" in search.reason
     unsure = steady_state(balance, COLD, COLD, lambda *near: (_as_estimated(*near)[0], math.inf))
     assert unsure.status == "too hot" and "beyond 350 C" in unsure.reason
     inner = [state.temperatures[2] for state in search.states]
