@@ -12,6 +12,7 @@ ROOT = Path(__file__).parents[2]
 SOURCES = [path for package in ("rbdyn", "doe") for path in (ROOT / package).rglob("*.py")]
 PAGES = [path for package in ("rbdyn", "doe") for path in (ROOT / package).rglob("*.md")]
 TOP_PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md"]
+EXAMPLES = sorted((ROOT / "examples").glob("*.toml"))
 # Names and public keys, which stay: whole constants of one word, and what stands in backticks or quotes.
 NAME = re.compile(r"\w+|[\w./]+\.csv")
 QUOTED = re.compile(r"class=\"\w+\"|``.*?``|`[^`\n]*`|https?://\S+")
@@ -86,6 +87,13 @@ def notes(path: Path) -> list[tuple[int, str]]:
                 values = named.get(text.id, []) if isinstance(text, ast.Name) else [text]
                 found += [(value.lineno, said) for value in values if (said := spoken(value))]
     return found
+
+
+def comments(table: str) -> Iterator[str]:
+    """Comments of a TOML file, those in lines of their own as one text."""
+    found = [re.findall("(.*?)# (.*)", line) for line in table.splitlines()]
+    yield " ".join(after for each in found for before, after in each if not before.strip())
+    yield from (after for each in found for before, after in each if before.strip())
 
 
 def without_code(page: str) -> str:

@@ -10,6 +10,7 @@ from pathlib import Path
 import grimp
 import pytest
 from prose import (
+    EXAMPLES,
     NAME,
     PAGES,
     QUOTED,
@@ -18,6 +19,7 @@ from prose import (
     SOURCES,
     SQL,
     TOP_PAGES,
+    comments,
     docstrings,
     messages,
     paragraphs,
@@ -274,12 +276,14 @@ def test_invariant_words_are_those_of_the_field():
 
 
 def test_invariant_messages_and_pages_use_plain_words():
-    """Invariant: no message, label or page has one of the words that a reader stumbles over; code, names and keys are exempt."""
+    """Invariant: no message, label, page or comment of an example has a word that a reader stumbles over; code and names are exempt."""
     words = re.compile("|".join(rf"\b(?:{words})\b" for words in SPOKEN), re.IGNORECASE)
     assert all(words.search(text) for text in ("the likeliest pick", "A row a run.", "it goes on", "by luck"))
     read, found = 0, []
-    for path in [*SOURCES, *PAGES, *TOP_PAGES]:
-        texts = messages(path) if path.suffix == ".py" else [(1, without_code(path.read_text(encoding="utf-8")))]
+    for path in [*SOURCES, *PAGES, *TOP_PAGES, *EXAMPLES]:
+        text = path.read_text(encoding="utf-8")
+        whole = "\n".join(comments(text)) if path in EXAMPLES else without_code(text)
+        texts = messages(path) if path.suffix == ".py" else [(1, whole)]
         for line, text in texts:
             read += 1
             if not NAME.fullmatch(text) and not re.fullmatch(r"[\w-]+", text):
@@ -315,8 +319,8 @@ def test_invariant_messages_are_short_sentences():
     assert read > 10_000 and not long, "\n".join(long)
 
 
-# Shapes that make a sentence hard to read, each with the most that messages and keys, docstrings and pages may have. Counts may
-# only fall.
+# Shapes that make a sentence hard to read, each with the most that messages and keys, docstrings, and pages with comments of
+# examples may have. Counts may only fall.
 SHAPES = {
     r"\b(?:that|those) of\b": (2, 317, 0),
     r"(?<![.?!] )\bwhat (?:the|a|its|it|they|is|are|was|stands?|fits|few|follows|goes)\b": (0, 145, 0),
@@ -347,12 +351,13 @@ def _shapes_of(texts: list[tuple[str, int, str]], shape: str) -> list[str]:
 
 
 def test_invariant_hard_shapes_of_sentences_get_fewer():
-    """Invariant: no shape that is hard to read occurs more often in messages, keys, help, docstrings and pages than is stated."""
+    """Invariant: no shape that is hard to read occurs more often in messages, docstrings, and pages with examples than is stated."""
     sides = []
     for read in (messages, docstrings):
         sides.append([(str(path.relative_to(ROOT)), line, text) for path in SOURCES for line, text in read(path)])
     texts = ((path.name, paragraphs(path.read_text(encoding="utf-8"))) for path in [*PAGES, *TOP_PAGES])
-    sides.append([(name, 1, text) for name, page in texts for text in page])
+    notes = ((path.name, comments(path.read_text(encoding="utf-8"))) for path in EXAMPLES)
+    sides.append([(name, 1, text) for name, page in (*texts, *notes) for text in page])
     assert all(len(side) > least for side, least in zip(sides, (3000, 3000, 300), strict=True))
     assert _shapes_of([("", 1, "that of its inputs, for no input is known")], "|".join(list(SHAPES)[:3]))
     excess = []
