@@ -192,7 +192,7 @@ key = "bearing.radial_clearance_mm"
 centre = 0.020
 step = 0.005
 resolution = 0.001              # of the drawing
-tolerance = 0.003               # half width that manufacture keeps
+tolerance = 0.003               # half width that can be manufactured
 """
 ROLLERS = """name = "rollers"
 key = "bearing.rollers"
