@@ -170,7 +170,7 @@ def solve_chains(
         limit, half_width = half_widths[study.factors.index(chain.factor)], chain.half_width_mm
         if half_width is not None and half_width > limit:
             sentence = (
-                f"{study.path}: chain {chain.name}: half_width_mm = {half_width:g} is wider than the {limit:.3g} within which "
+                f"{study.path}: chain {chain.name}: half_width_mm = {half_width:g}: is wider than the {limit:.3g} within which "
                 "the gains are kept as [tolerances] asks; narrow it, or require less there"
             )
             notes.append(Note("chain", sentence))

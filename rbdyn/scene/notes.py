@@ -136,7 +136,7 @@ def _note(key: str, value: float, low: float, high: float) -> Note:
     likely = {other: number for other, number in candidates.items() if low <= number <= high}
     other = _nearest(likely, low, high)
     fix = "check its unit" if other is None else f"if {value:g} {other} are meant, write {likely[other]:.4g}"
-    return Note("unit", f"{key} = {value:g} is outside the usual {low:.3g} to {high:.3g}; {fix}")
+    return Note("unit", f"{key} = {value:g}: is outside the usual {low:.3g} to {high:.3g}; {fix}")
 
 
 def _nearest(likely: Mapping[str, float], low: float, high: float) -> str | None:

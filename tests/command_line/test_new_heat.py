@@ -79,7 +79,7 @@ def test_command_line_what_heat_assumes_says_so(command):
         (("--ambient", "20", "--temperature", "70"), "--temperature 70: --ambient 20 computes the temperatures"),
         (("--ambient", "20", "--lubrication", "jet"), "--lubrication jet: with --ambient it needs --oil-flow"),
         ((*FLOW, "--oil", "grease VG 100"), "--oil-flow 0.4: contradicts a grease, which does not flow"),
-        (("--oil-flow", "400", "--oil-inlet", "60"), "--oil-flow 400: outside the usual 0 to 43.2; if 400 mL/min"),
+        (("--oil-flow", "400", "--oil-inlet", "60"), "--oil-flow 400: is outside the usual 0 to 43.2; if 400 mL/min"),
         (("--oil-flow", "1", "--oil-inlet", "150"), "--oil-inlet 150: not below 120, the usual ceiling"),
         (("--ambient", "300"), "--ambient 300: must be from -60 to 220 C; if 300 K are meant, write 26.85"),
     ],

@@ -82,7 +82,7 @@ def test_unit_clearances_and_conformities():
         ((*ROLLERS, "--width", "6.5"), ["--roller 7x7: is longer than the ring of --width 6.5; shorten the roller or widen the ring"]),
         ((*ROLLERS, "--bore", "54", "--outside", "66"), ["--bore 54: leaves no inner ring under a raceway of 53 mm; make it smaller", "--outside 66: leaves no outer ring over a raceway of 67 mm; make it larger"]),
         ((*ROLLERS, "--clearance", "0.8"), ["--clearance 0.8: is out of proportion to rollers of 7 mm; write millimetres, below 0.7"]),
-        ((*ROLLERS, "--clearance", "0.5"), ["--clearance 0.5: outside the usual 0.0005 to 0.3; if 0.5 um are meant, write 0.0005"]),
+        ((*ROLLERS, "--clearance", "0.5"), ["--clearance 0.5: is outside the usual 0.0005 to 0.3; if 0.5 um are meant, write 0.0005"]),
         ((*ROLLERS, "--guidance", "middle"), ["--guidance middle: guides no cage; choose one of outer, inner, roller"]),
         ((*ROLLERS, "--preload", "10", "--speed", "0"), ["--preload 10: is one of ball bearings; leave it out", "--speed 0: a run is counted in shaft turns; give at least 0.1"]),
         ((*ROLLERS, "--load", "9e6"), ["--load 9e6: a roller of 7 mm would have a contact 7.88 mm wide; reduce the load or check its unit"]),

@@ -12,7 +12,8 @@ ROOT = Path(__file__).parents[2]
 SOURCES = [path for package in ("rbdyn", "doe") for path in (ROOT / package).rglob("*.py")]
 PAGES = [path for package in ("rbdyn", "doe") for path in (ROOT / package).rglob("*.md")]
 TOP_PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md"]
-EXAMPLES = sorted((ROOT / "examples").glob("*.toml"))
+# Scenes and studies with comments: examples, and the templates of new ones.
+EXAMPLES = [path for folder in ("examples", "rbdyn/draft", "doe/commands") for path in (ROOT / folder).glob("*.toml")]
 # Names and public keys, which stay: whole constants of one word, and what stands in backticks or quotes.
 NAME = re.compile(r"\w+|[\w./]+\.csv")
 QUOTED = re.compile(r"class=\"\w+\"|``.*?``|`[^`\n]*`|https?://\S+")

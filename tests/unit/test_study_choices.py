@@ -68,7 +68,7 @@ def test_chains_come_from_a_file_and_take_the_tolerance_found(tmp_path):
     low, high = chains["guide"].worst_case_mm
     assert 0.140 - 1e-9 <= low < high <= 0.160 + 1e-9
     assert chains["pocket"].worst_case_mm == pytest.approx((0.295, 0.305))
-    assert len(notes) == 1 and "half_width_mm = 0.005 is wider than the 0.003" in notes[0]
+    assert len(notes) == 1 and "half_width_mm = 0.005: is wider than the 0.003" in notes[0]
     nothing = SimpleNamespace(half_widths=np.zeros(3))
     chains, notes = solve_chains(study, study.baseline, nothing)
     # Without a tolerance that is found, parts are made to the factor's own.
