@@ -34,7 +34,7 @@ STUDY_FILES = (
 
 @dataclass(frozen=True, repr=False, eq=False)
 class StudyAnswer(Answer):
-    """Chosen clearances with their gains, limits and parts.
+    """Selected clearances with their gains, limits and parts.
 
     Tables: "gains" (one row per response: baseline and pick, simulated), "pick" (one row per factor), "runs", "front", "confirmation"
     (all simulated points), "parts" (dimensions [mm]), and "quality", "anova", "coefficients" of the fits. Over a duty also

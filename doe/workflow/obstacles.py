@@ -153,7 +153,7 @@ class Obstacles(Record):
         broken = any(limit.verdict == "broken" for limit in self.limits)
         worst = "broken-limit" if broken or not self.reachable else "open-limit"
         if not self.reachable:
-            least = "No point of the region meets all limits: the chosen clearances violate them least."
+            least = "No point of the region meets all limits: the selected clearances violate them least."
             yield Note(worst, least)
         for limit in self.limits:
             sure = limit.verdict == "broken" or not self.reachable

@@ -34,7 +34,7 @@ from rbdyn.cli.app import app
 
 ORDER = (
     "made-up bearing",
-    "Chosen clearances",
+    "Selected clearances",
     "Limits judged",
     "Changes confirmed",
     "Parts to make",

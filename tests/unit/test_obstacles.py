@@ -71,7 +71,7 @@ def test_a_limit_that_no_point_keeps_ends_in_a_report_with_the_best_point(tmp_pa
     assert obstacles == sentences
     assert "No point of the region meets all limits" in (out / "report.html").read_text("utf-8")
     answer = (out / "answer.txt").read_text("utf-8")
-    assert answer.index("No point of the region") < answer.index("Chosen clearances") < answer.index("✗ violated")
+    assert answer.index("No point of the region") < answer.index("Selected clearances") < answer.index("✗ violated")
     again = commanded(path, "-q")
     assert again.exit_code == 1 and "Finished before" in again.stdout and sentences[1] in again.stderr
 

@@ -120,7 +120,7 @@ def test_a_broken_limit_warns_before_gains_and_fails_the_study_also_when_asked_a
     first, again = (CliRunner().invoke(app, arguments) for _ in range(2))
     for shown in (first, again):
         assert shown.exit_code == 1, shown.output
-        words = ("Danger: Limit impact force <= 35", "Chosen clearances", "✗ violated", "Changes confirmed")
+        words = ("Danger: Limit impact force <= 35", "Selected clearances", "✗ violated", "Changes confirmed")
         places = [*map(shown.stdout.index, words)]
         assert places == sorted(places) and "LIMIT BROKEN" not in shown.stdout
     assert "Finished before" in again.stdout

@@ -276,7 +276,7 @@ def _chosen(summary: Summary, inputs: Sequence[Factor]) -> Table:
         ),
         Column("", words=GRADE, cell=lambda factor: next((w.grade for w in _widths(summary, factor) if w.grade), "")),
     )
-    return replace(Sheet("Chosen clearances", columns, inputs).block.without_empty_columns(), tiles=(GRADE,))
+    return replace(Sheet("Selected clearances", columns, inputs).block.without_empty_columns(), tiles=(GRADE,))
 
 
 def _widths(summary: Summary, factor: Factor) -> list[Made | FactorTolerance]:
