@@ -317,7 +317,7 @@ def _factors(scene: dict[str, Any]) -> list[Factor]:
             continue
         step = max(round(clearance.step * abs(centre) / RESOLUTION_MM) * RESOLUTION_MM, SMALLEST_STEP_MM)
         width = f"{100.0 * clearance.step:g} % of it"
-        factors.append(Factor(name, table, float(centre), step, "as the scene has it", width))
+        factors.append(Factor(name, table, float(centre), step, "value in the scene file", width))
     return factors
 
 

@@ -11,7 +11,7 @@ from rbdyn.properties.tolerances import grade_tolerances
 ROLLER_HALF_WIDTHS = (0.001, 0.0005)
 
 # Of a study that derives its tolerances, whose chains are made to these.
-DERIVED = "would state it. Without: as [tolerances] derives, else as the factor states"
+DERIVED = "would state it. Default: as [tolerances] derives it, otherwise as the factor states it"
 MARK = "estimated = true # until a drawing states it: parts and reports mark it\n"
 
 

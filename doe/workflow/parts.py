@@ -91,7 +91,7 @@ def clearance_parts(scene: Scene) -> dict[str, ClearanceParts]:
     )
     groups = [
         ClearanceParts(
-            "radial", "radial_clearance_mm", "outer raceway less inner raceway less two rollers, of the loose bearing",
+            "radial", "radial_clearance_mm", "outer raceway less inner raceway less two rollers, before mounting",
             RACEWAY_GRADE, raceways, "outer_raceway",
         ),
         *_guide(scene),
@@ -110,7 +110,7 @@ def _guide(scene: Scene) -> Iterator[ClearanceParts]:
     if clearance is None or scene.cage.guidance == "roller":
         return
     on_drawing = scene.cage.land_diameter_mm is not None
-    source = "cage.land_diameter_mm" if on_drawing else "estimated: pitch diameter {} 2/3 roller; put in the drawing's"
+    source = "cage.land_diameter_mm" if on_drawing else "estimated: pitch diameter {} 2/3 roller; see your drawing"
     if scene.cage.guidance == "outer":
         words = "land of the outer ring less outside diameter of the cage"
         parts = (

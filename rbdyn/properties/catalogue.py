@@ -365,7 +365,7 @@ def roller_interior(sizes: Envelope, narrow: bool) -> RollerInterior:
     if sizes.inner_raceway is not None and sizes.outer_raceway is not None:
         diameter = 0.5 * (sizes.outer_raceway - sizes.inner_raceway)
         pitch = 0.5 * (sizes.outer_raceway + sizes.inner_raceway)
-        by = "half of what both raceways of the catalogue leave"
+        by = "half the difference between both raceway diameters of the catalogue"
         around = "mean of both raceways of the catalogue"
     else:
         share = NARROW_ROLLER_SHARE if narrow else ROLLER_SHARE

@@ -91,7 +91,7 @@ def roller_boundary(drawing: RollerDrawing, bore: float | None, outside: float |
     along = max(
         Estimate(
             drawing.length + RING_WIDER * drawing.diameter,
-            f"estimated: roller + {RING_WIDER:g} {error}; 0.4 to 0.8 are made",
+            f"estimated: roller + {RING_WIDER:g} {error}; 0.4 to 0.8 are usual",
         ),
         Estimate(drawing.length / LONG_SHARE, f"estimated: roller/{LONG_SHARE:g}, as of the longest rollers, +-10 %"),
     )
@@ -111,7 +111,7 @@ def ball_boundary(drawing: BallDrawing, bore: float | None, outside: float | Non
     if bore is not None:
         outsides = [Estimate(2.0 * pitch - bore, f"{twice} bore, +-2 %"), *outsides]
     rings = _bore(drawing, bore, bores), _outside(drawing, outside, outsides)
-    along = Estimate(BALL_WIDTH * drawing.diameter, f"estimated: {BALL_WIDTH:g} ball diameters; 1.4 to 2.0 are made")
+    along = Estimate(BALL_WIDTH * drawing.diameter, f"estimated: {BALL_WIDTH:g} ball diameters; 1.4 to 2.0 are usual")
     return _boundary(*rings, along.rounded if width is None else Estimate(width, STATED))
 
 
