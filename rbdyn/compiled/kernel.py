@@ -35,7 +35,7 @@ from typing import Any
 import llvmlite
 import numba
 import numba.extending
-from llvmlite.binding import get_host_cpu_features
+from llvmlite.binding import get_host_cpu_features, get_host_cpu_name
 from numba import njit, types
 
 from rbdyn.base.digests import compiled_digest, content_of, user_cache, with_digest
@@ -43,9 +43,9 @@ from rbdyn.base.notes import Note, Notes
 
 # Environment variable that selects numba's own njit.
 STOCK = "RBDYN_STOCK_NUMBA"
-# Doubles in the widest vector register. Loops over whole vectors have no scalar rest. Results do not depend on it, since each
-# lane is rounded separately.
-VECTOR = 8 if get_host_cpu_features().get("avx512f") else 4
+# Doubles in the widest vector register that LLVM fills: on other makers' processors than AMD's it halves registers of 512 bits.
+# Loops over whole vectors have no scalar rest. Results do not depend on it, since each lane is rounded separately.
+VECTOR = 8 if get_host_cpu_name().startswith("znver") and get_host_cpu_features().get("avx512f") else 4
 # Versions on which saved code depends.
 VERSIONS = (sys.implementation.cache_tag, llvmlite.__version__, numba.__version__)
 # Whether kernels stay Python: NUMBA_DISABLE_JIT.
