@@ -300,6 +300,11 @@ def traction_by_table(model, slip, load, value):
     """``traction`` of a law without its table, from the value of the table."""
 
 
+@traction_by_table.body(NoTraction, FourConstantTraction, BlendedFourConstantTraction, CoulombTraction)
+def _(model, slip, load, value):
+    return traction(model, slip, load)
+
+
 @traction_by_table.body(SurfaceAxes)
 def _(model, slip, load, value):
     ratio = slip_ratio(model, slip)
@@ -314,6 +319,11 @@ def _(model, slip, load, value):
 @law
 def growth_by_table(model, slip, load, value, slope):
     """``growth`` of a law without its table, from value and slope of its ``table_cubic``."""
+
+
+@growth_by_table.body(NoTraction, FourConstantTraction, BlendedFourConstantTraction, CoulombTraction)
+def _(model, slip, load, value, slope):
+    return growth(model, slip, load)
 
 
 @growth_by_table.body(SurfaceAxes)

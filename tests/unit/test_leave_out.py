@@ -219,7 +219,7 @@ def test_unit_the_state_holds_what_moves(outer, everything):
         sizes.append(sum(part.size for part in arrays_of(run)))
     assert sizes[1] - sizes[0] == 11 * (4 + 3)
     # How rollers and races meet, kept between loops, and what is followed of each roller.
-    assert sizes[0] < 11 * 60 + 540 + 320 + 60
+    assert sizes[0] < 11 * 60 + 1080 + 640 + 60
 
 
 def test_unit_parameters_are_few(outer, optional):

@@ -1,8 +1,9 @@
 """Race contacts side by side: blocks of contacts in straight-line code, which the compiler turns into vector code.
 
-Whole vectors of rollers go through the outer race straight from the state. The remaining ones, and the rollers that touch
-the inner race, are packed; where both races follow the same laws they share vectors. A look-up in a table is no vector
-code. So a traction law with a table takes three loops: how rollers and race meet, the look-ups one by one, and the forces.
+Whole vectors of rollers meet the outer race straight from the state. The remaining ones, and the rollers that touch the
+inner race, are packed; where both races follow the same laws they share vectors. A block takes three loops: how rollers and
+race meet, look-ups in tables one by one, which are no vector code, and the forces. So the roots and quotients of several
+vectors overlap.
 
 Where a scene asks for them, oil films drive the rollers that do not touch the inner race.
 """
@@ -29,7 +30,6 @@ from rbdyn.contact.tangential import (
     keep_coefficient_rate,
     relax_coefficients,
     steady_by_table,
-    steady_traction,
 )
 from rbdyn.contact.traction import (
     BlendedFourConstantTraction,
@@ -61,7 +61,7 @@ from rbdyn.dynamics.forces.state import ROLLER_STATES
 
 # Blocks hold LANES contacts, VECTOR of them at a time; each quantity is a row of a block. Packed rollers bring their
 # coordinates, their radii, the side of the race (+1 outer, -1 inner) and their traction coefficients.
-LANES, OUTPUTS = 16, 9
+LANES, OUTPUTS = 32, 9
 RADII = ROLLER_STATES * LANES
 SIDES = RADII + LANES
 COEFFICIENTS = SIDES + LANES
@@ -69,8 +69,8 @@ COEFFICIENTS = SIDES + LANES
 FORCE_X, FORCE_Y, ROLLER_MOMENT, RING_MOMENT, LOAD, TRACTION, ROLLING, DAMPING, COEFFICIENT_RATE = range(
     0, OUTPUTS * LANES, LANES
 )
-# Where the rows between the loops of a law with a table begin: the fields of ``RaceApproach``, side and traction
-# coefficient, the place in the table, and four coefficients for each lane in turn.
+# Where the rows between the loops begin: the fields of ``RaceApproach``, side and traction coefficient, the place in the
+# table, and four coefficients for each lane in turn.
 INPUTS = 16
 (
     NX, NY, INVERSE, SLOPE, LEAN, MET_LOAD, STIFFNESS, MET_DAMPING, ROLLER_LEVER, RING_LEVER, SLIP, ENTRAINMENT,
@@ -233,8 +233,9 @@ def approach_in_lane(race, side, radius, ring, source, j, stride):
 
 
 @kernel
-def keep_approach(met, i, traction_model, approach, side, coefficient):
-    """Write a ``RaceApproach`` to lane ``i``, with side, traction coefficient and place in the table."""
+def keep_approach(race, side, radius, ring, source, j, stride, coefficient, met, i):
+    """Write the ``RaceApproach`` of ``approach_in_lane`` to lane ``i``, with side, traction coefficient and place in the table."""
+    approach = approach_in_lane(race, side, radius, ring, source, j, stride)
     met[NX + i] = approach.nx
     met[NY + i] = approach.ny
     met[INVERSE + i] = approach.inverse
@@ -249,7 +250,27 @@ def keep_approach(met, i, traction_model, approach, side, coefficient):
     met[ENTRAINMENT + i] = approach.entrainment
     met[SIDE + i] = side
     met[COEFFICIENT + i] = coefficient
-    met[ALONG + i], met[ACROSS + i] = table_place(traction_model, approach.slip, approach.load)
+    keep_place(race.traction, approach.slip, approach.load, met, i)
+
+
+@law
+def keep_place(traction_model, slip, load, met, i):
+    """Write the place of lane ``i`` in the table of a law."""
+
+
+@keep_place.body(NoTraction, FourConstantTraction, BlendedFourConstantTraction, CoulombTraction)
+def _(traction_model, slip, load, met, i):
+    pass
+
+
+@keep_place.body(SurfaceAxes)
+def _(traction_model, slip, load, met, i):
+    met[ALONG + i], met[ACROSS + i] = table_place(traction_model, slip, load)
+
+
+@keep_place.body(MixedTraction)
+def _(traction_model, slip, load, met, i):
+    keep_place(traction_model.fluid, slip, load, met, i)
 
 
 @kernel
@@ -271,9 +292,18 @@ def approach_of_lane(met, i):
     )
 
 
-@kernel
+@law
 def look_up(traction_model, met, first, count):
     """Write the cubics along the slip of the lanes from ``first`` to ``count``, whose place in the cell replaces that in the table."""
+
+
+@look_up.body(NoTraction, FourConstantTraction, BlendedFourConstantTraction, CoulombTraction)
+def _(traction_model, met, first, count):
+    pass
+
+
+@look_up.body(TractionSurface)
+def _(traction_model, met, first, count):
     for i in range(first, count):
         place = CUBIC + 4 * i
         met[place], met[place + 1], met[place + 2], met[place + 3], met[ALONG + i] = table_cubic(
@@ -281,88 +311,71 @@ def look_up(traction_model, met, first, count):
         )
 
 
-@kernel
-def wrenches(outer, inner, met, lanes, count):
-    """Write the wrenches from approaches and look-ups to ``lanes``; races as ``lane_race``."""
-    for i in range(lanes_to_fill(inner, count)):
-        side = met[SIDE + i]
-        race, approach = either(side > 0.0, outer, inner), approach_of_lane(met, i)
-        place = CUBIC + 4 * i
-        value, slope = cubic(met[place], met[place + 1], met[place + 2], met[place + 3], met[ALONG + i])
-        steady = steady_by_table(race.tangential, race.traction, approach.slip, approach.load, value, slope)
-        keep_lane(race.tangential, lanes, i, race_wrench(race, side, approach, steady, met[COEFFICIENT + i]))
+@look_up.body(MixedTraction)
+def _(traction_model, met, first, count):
+    look_up(traction_model.fluid, met, first, count)
 
 
 @law
-def outer_block(traction_model, race, sizes, ring, y, first, rollers, scratch, count):
-    """Outer contacts of ``count`` rollers from ``first`` on, in whole vectors where the race allows, to the lanes of ``scratch``.
+def from_table(traction_model, met, i):
+    """Value and slope over the slip at lane ``i`` from the table of a law, after ``look_up``; 0 without a table."""
 
-    The lanes past ``count`` hold no contact. ``traction_model``: that of the race.
+
+@from_table.body(NoTraction, FourConstantTraction, BlendedFourConstantTraction, CoulombTraction)
+def _(traction_model, met, i):
+    return 0.0, 0.0
+
+
+@from_table.body(SurfaceAxes)
+def _(traction_model, met, i):
+    place = CUBIC + 4 * i
+    return cubic(met[place], met[place + 1], met[place + 2], met[place + 3], met[ALONG + i])
+
+
+@from_table.body(MixedTraction)
+def _(traction_model, met, i):
+    return from_table(traction_model.fluid, met, i)
+
+
+@kernel
+def outer_approaches(race, sizes, ring, y, first, rollers, met, count):
+    """How ``count`` rollers from ``first`` on meet the outer race, in whole vectors where it allows, to the lanes of ``met``.
+
+    The lanes past ``count`` hold no contact.
     """
-
-
-@outer_block.body(NoTraction, FourConstantTraction, BlendedFourConstantTraction, CoulombTraction)
-def _(traction_model, race, sizes, ring, y, first, rollers, scratch, count):
-    for i in range(lanes_to_fill(race, count)):
-        j = first + i
-        approach = approach_in_lane(race, 1.0, roller_radius(sizes, j), ring, y, j, rollers)
-        steady = steady_traction(race.tangential, race.traction, approach.slip, approach.load)
-        coefficient = coefficient_of(race.tangential, y, j)
-        keep_lane(race.tangential, scratch.lanes, i, race_wrench(race, 1.0, approach, steady, coefficient))
-
-
-@outer_block.body(TractionSurface)
-def _(traction_model, race, sizes, ring, y, first, rollers, scratch, count):
     bare = lane_race(race)
     for i in range(lanes_to_fill(race, count)):
         j = first + i
-        approach = approach_in_lane(bare, 1.0, roller_radius(sizes, j), ring, y, j, rollers)
-        keep_approach(scratch.met, i, bare.traction, approach, 1.0, coefficient_of(bare.tangential, y, j))
-    look_up(race.traction, scratch.met, 0, count)
-    wrenches(bare, bare, scratch.met, scratch.lanes, count)
+        coefficient = coefficient_of(bare.tangential, y, j)
+        keep_approach(bare, 1.0, roller_radius(sizes, j), ring, y, j, rollers, coefficient, met, i)
 
 
-@outer_block.body(MixedTraction)
-def _(traction_model, race, sizes, ring, y, first, rollers, scratch, count):
-    outer_block(traction_model.fluid, race, sizes, ring, y, first, rollers, scratch, count)
+@kernel
+def packed_approaches(outer, inner, sizes, outer_ring, inner_ring, scratch, first, count):
+    """As ``outer_approaches``, for the packed contacts in the lanes from ``first`` to ``count``.
 
-
-@law
-def packed_block(traction_model, outer, inner, sizes, outer_ring, inner_ring, scratch, outer_count, count):
-    """As ``outer_block``, for packed contacts: ``outer_count`` of the outer race first, then those of the inner one.
-
-    There are outer ones only where both races share vectors.
+    There are those of the outer race only where both races share vectors.
     """
-
-
-@packed_block.body(NoTraction, FourConstantTraction, BlendedFourConstantTraction, CoulombTraction)
-def _(traction_model, outer, inner, sizes, outer_ring, inner_ring, scratch, outer_count, count):
-    packed = scratch.packed
-    for i in range(lanes_to_fill(inner, count)):
-        side = packed[SIDES + i]
-        race, ring = either(side > 0.0, outer, inner), either(side > 0.0, outer_ring, inner_ring)
-        approach = approach_in_lane(race, side, lane_radius(sizes, packed, i), ring, packed, i, LANES)
-        steady = steady_traction(race.tangential, race.traction, approach.slip, approach.load)
-        coefficient = packed[COEFFICIENTS + i]
-        keep_lane(race.tangential, scratch.lanes, i, race_wrench(race, side, approach, steady, coefficient))
-
-
-@packed_block.body(TractionSurface)
-def _(traction_model, outer, inner, sizes, outer_ring, inner_ring, scratch, outer_count, count):
     packed, bare_outer, bare_inner = scratch.packed, lane_race(outer), lane_race(inner)
-    for i in range(lanes_to_fill(inner, count)):
+    for i in range(first, lanes_to_fill(inner, count)):
         side = packed[SIDES + i]
         race, ring = either(side > 0.0, bare_outer, bare_inner), either(side > 0.0, outer_ring, inner_ring)
-        approach = approach_in_lane(race, side, lane_radius(sizes, packed, i), ring, packed, i, LANES)
-        keep_approach(scratch.met, i, race.traction, approach, side, packed[COEFFICIENTS + i])
-    look_up(outer.traction, scratch.met, 0, outer_count)
-    look_up(inner.traction, scratch.met, outer_count, count)
-    wrenches(bare_outer, bare_inner, scratch.met, scratch.lanes, count)
+        coefficient = packed[COEFFICIENTS + i]
+        keep_approach(race, side, lane_radius(sizes, packed, i), ring, packed, i, LANES, coefficient, scratch.met, i)
 
 
-@packed_block.body(MixedTraction)
-def _(traction_model, outer, inner, sizes, outer_ring, inner_ring, scratch, outer_count, count):
-    packed_block(traction_model.fluid, outer, inner, sizes, outer_ring, inner_ring, scratch, outer_count, count)
+@kernel
+def wrenches(outer, inner, met, lanes, outer_count, count):
+    """Write the wrenches from approaches to ``lanes``: of ``outer_count`` contacts of the outer race, then of the inner one."""
+    filled, bare_outer, bare_inner = lanes_to_fill(inner, count), lane_race(outer), lane_race(inner)
+    look_up(outer.traction, met, 0, outer_count)
+    look_up(inner.traction, met, outer_count, filled)
+    for i in range(filled):
+        side = met[SIDE + i]
+        race, approach = either(side > 0.0, bare_outer, bare_inner), approach_of_lane(met, i)
+        value, slope = from_table(race.traction, met, i)
+        steady = steady_by_table(race.tangential, race.traction, approach.slip, approach.load, value, slope)
+        keep_lane(race.tangential, lanes, i, race_wrench(race, side, approach, steady, met[COEFFICIENT + i]))
 
 
 @kernel
@@ -373,7 +386,6 @@ def pack(race, sizes, rollers, y, j, side, scratch, lane):
     scratch.packed[RADII + lane] = roller_radius(sizes, j)
     scratch.packed[SIDES + lane] = side
     scratch.packed[COEFFICIENTS + lane] = coefficient_of(race.tangential, y, j)
-    scratch.roller[lane] = j
 
 
 @kernel
@@ -399,6 +411,17 @@ def add_to_roller(lanes, i, j, rollers, row, dy):
 
 
 @kernel
+def add_outer(race, lanes, first, count, rollers, row, dy, sums):
+    """``OnRing`` of the outer ring with ``count`` contacts, those of the rollers from ``first`` on, which also go to ``dy``."""
+    for i in range(count):
+        add_to_roller(lanes, i, first + i, rollers, row, dy)
+        add_coefficient_rate(race.tangential, lanes[COEFFICIENT_RATE + i], first + i, row, dy)
+    for i in range(count):
+        sums = add_to_ring(lanes, i, sums)
+    return sums
+
+
+@kernel
 def race_forces(outer, inner, sizes, outer_ring, inner_ring, rollers, y, row, dy, scratch):
     """All contacts of both races: adds forces and moments on the rollers to row ``row`` of ``dy``.
 
@@ -406,24 +429,22 @@ def race_forces(outer, inner, sizes, outer_ring, inner_ring, rollers, y, row, dy
     load zone touch the inner one, and are packed first.
     """
     relax_coefficients(inner.tangential, rollers, y, row, dy)
-    lanes, index = scratch.lanes, scratch.roller
+    lanes, met, index, shared = scratch.lanes, scratch.met, scratch.roller, share_vectors(outer, inner)
     on_outer = on_inner = OnRing(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    in_order = rollers // VECTOR * VECTOR if share_vectors(outer, inner) else rollers
     start = 0
-    while start < in_order:
-        count = min(LANES, in_order - start)
-        outer_block(outer.traction, outer, sizes, outer_ring, y, start, rollers, scratch, count)
-        for i in range(count):
-            add_to_roller(lanes, i, start + i, rollers, row, dy)
-            add_coefficient_rate(outer.tangential, lanes[COEFFICIENT_RATE + i], start + i, row, dy)
-        for i in range(count):
-            on_outer = add_to_ring(lanes, i, on_outer)
-        start += LANES
+    while start < rollers and not shared:
+        count = min(LANES, rollers - start)
+        outer_approaches(outer, sizes, outer_ring, y, start, rollers, met, count)
+        wrenches(outer, outer, met, lanes, count, count)
+        on_outer = add_outer(outer, lanes, start, count, rollers, row, dy, on_outer)
+        start += count
 
     candidate, reach2 = 0, inner.reach * inner.reach
-    start = in_order
     while start < rollers or candidate < rollers:
-        count = 0
+        first = start
+        count = packed = min(LANES, (rollers - start) // VECTOR * VECTOR) if shared else 0
+        outer_approaches(outer, sizes, outer_ring, y, start, rollers, met, count)
+        start += count
         while start < rollers and count < LANES:
             pack(outer, sizes, rollers, y, start, 1.0, scratch, count)
             start += 1
@@ -433,16 +454,14 @@ def race_forces(outer, inner, sizes, outer_ring, inner_ring, rollers, y, row, dy
             dx, dy_ = y[candidate] - inner_ring.x, y[rollers + candidate] - inner_ring.y
             if dx * dx + dy_ * dy_ < reach2:
                 pack(inner, sizes, rollers, y, candidate, -1.0, scratch, count)
+                index[count] = candidate
                 count += 1
             candidate += 1
-        if count > 0:
-            packed_block(inner.traction, outer, inner, sizes, outer_ring, inner_ring, scratch, outer_count, count)
-        for i in range(count):
-            add_to_roller(lanes, i, index[i], rollers, row, dy)
-        for i in range(outer_count):
-            add_coefficient_rate(outer.tangential, lanes[COEFFICIENT_RATE + i], index[i], row, dy)
-            on_outer = add_to_ring(lanes, i, on_outer)
+        packed_approaches(outer, inner, sizes, outer_ring, inner_ring, scratch, packed, count)
+        wrenches(outer, inner, met, lanes, outer_count, count)
+        on_outer = add_outer(outer, lanes, first, outer_count, rollers, row, dy, on_outer)
         for i in range(outer_count, count):
+            add_to_roller(lanes, i, index[i], rollers, row, dy)
             add_coefficient_rate(inner.tangential, lanes[COEFFICIENT_RATE + i], index[i], row, dy)
             on_inner = add_to_ring(lanes, i, on_inner)
     return on_outer, on_inner
