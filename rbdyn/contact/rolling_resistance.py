@@ -264,6 +264,21 @@ def touching_gap(
 
 
 @law
+def film_reach(film):
+    """Gap [m] from which on there is no film."""
+
+
+@film_reach.body(OpenFilm)
+def _(film):
+    return math.inf
+
+
+@film_reach.body(LayerFilm)
+def _(film):
+    return 1.0 / (film.inverse_root * film.inverse_root)
+
+
+@law
 def film_forces(film, overlap, entrainment_speed, slip):
     """Rolling force on each surface and sliding force on the roller [N], with the signs of the speeds [m/s]; 0 in contact.
 

@@ -264,9 +264,7 @@ def derivative(bearing, y, row, dy, power, loads, scratch):
     land = guide_forces(bearing.guide, cage, inner, outer)
     pockets = pocket_forces(bearing, cage, touching, y, row, dy, scratch)
     on_outer, on_inner = race_forces(bearing.outer, bearing.inner, bearing.sizes, outer, inner, z, y, row, dy, scratch)
-    on_inner = with_open_films(
-        bearing.open_film, on_inner, bearing.inner, bearing.sizes, inner, z, y, row, dy, scratch.lanes
-    )
+    on_inner = with_open_films(bearing.open_film, on_inner, bearing.inner, bearing.sizes, inner, z, y, row, dy, scratch)
     accelerate_rollers(bearing, row, dy)
     accelerate_cage(bearing, cage, pockets, land, row, dy)
     ring_fx, ring_fy = on_inner.x + land.inner_x + acting.load_x, on_inner.y + land.inner_y + acting.load_y

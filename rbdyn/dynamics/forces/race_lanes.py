@@ -22,7 +22,7 @@ from rbdyn.contact.hertz_line import (
     SlicedLineContact,
     TiltedLineContact,
 )
-from rbdyn.contact.rolling_resistance import LayerFilm, OpenFilm, film_forces
+from rbdyn.contact.rolling_resistance import LayerFilm, OpenFilm, film_forces, film_reach
 from rbdyn.contact.tangential import (
     RigidContact,
     add_coefficient_rate,
@@ -77,6 +77,7 @@ INPUTS = 16
     SIDE, COEFFICIENT, ALONG, ACROSS,
 ) = range(0, INPUTS * LANES, LANES)  # fmt: skip
 CUBIC = INPUTS * LANES
+ROUND_OFF = 1e-9  # of a distance
 
 
 class OnRing(NamedTuple):
@@ -504,31 +505,40 @@ def open_contact(film, race, radius, ring, dx, dy, dvx, dvy, roller_spin):
 
 
 @law
-def with_open_films(film, on_ring, race, sizes, ring, rollers, y, row, dy, lanes):
+def with_open_films(film, on_ring, race, sizes, ring, rollers, y, row, dy, scratch):
     """``OnRing`` of the inner ring with the films of all rollers, whose forces and moments go to row ``row`` of ``dy``.
 
-    ``lanes``: work space, as ``race_lanes.Scratch`` has it.
+    Rollers that touch the race, or are farther from it than the film reaches, are left out.
     """
 
 
 @with_open_films.body(NoOpenFilm)
-def _(film, on_ring, race, sizes, ring, rollers, y, row, dy, lanes):
+def _(film, on_ring, race, sizes, ring, rollers, y, row, dy, scratch):
     return on_ring
 
 
 @with_open_films.body(OpenFilm, LayerFilm)
-def _(film, on_ring, race, sizes, ring, rollers, y, row, dy, lanes):
-    sums = on_ring
-    for start in range(0, rollers, LANES):
-        count = min(LANES, rollers - start)
-        # Whole vectors: other numbers of the state follow the last roller, and lanes past ``count`` hold no contact.
-        for i in range(whole_vectors(count)):
-            j = start + i
+def _(film, on_ring, race, sizes, ring, rollers, y, row, dy, scratch):
+    packed, lanes, index, sums = scratch.packed, scratch.lanes, scratch.roller, on_ring
+    far = (race.reach + film_reach(film)) * (1.0 + ROUND_OFF)
+    j = 0
+    while j < rollers:
+        count = 0
+        while j < rollers and count < LANES:
+            # As far below the mean radius of race and roller as ``reach`` is above it.
+            near = (2.0 * (race.radius + roller_radius(sizes, j)) - race.reach) * (1.0 - ROUND_OFF)
             dx, dy_ = y[j] - ring.x, y[rollers + j] - ring.y
-            dvx, dvy = y[2 * rollers + j] - ring.vx, y[3 * rollers + j] - ring.vy
-            radius, spin = roller_radius(sizes, j), y[4 * rollers + j]
+            if near * near < dx * dx + dy_ * dy_ < far * far:
+                pack(race, sizes, rollers, y, j, -1.0, scratch, count)
+                index[count] = j
+                count += 1
+            j += 1
+        for i in range(whole_vectors(count)):
+            dx, dy_ = packed[i] - ring.x, packed[LANES + i] - ring.y
+            dvx, dvy = packed[2 * LANES + i] - ring.vx, packed[3 * LANES + i] - ring.vy
+            radius, spin = lane_radius(sizes, packed, i), packed[4 * LANES + i]
             keep_lane(RigidContact(), lanes, i, open_contact(film, race, radius, ring, dx, dy_, dvx, dvy, spin))
         for i in range(count):
-            add_to_roller(lanes, i, start + i, rollers, row, dy)
+            add_to_roller(lanes, i, index[i], rollers, row, dy)
             sums = add_to_ring(lanes, i, sums)
     return sums
