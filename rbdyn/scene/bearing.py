@@ -115,7 +115,7 @@ class Bearing(Consistent):
     inner_ring_mass_kg: Annotated[float, Field(ge=LIGHTEST_RING_KG, le=1e5)] = 1.0
     """Mass of the inner ring and the part of the shaft that moves with it. Drawings give the ring alone (0.04 kg for the
     bearing of Chen et al. 2022); add the share of the rotor that this bearing carries. Typical: 1 to 5 kg for a main shaft of
-    this size. Effect: 0.3, 1 and 3 kg give impact forces of 91, 86 and 93 N and whirl ratios of 0.51, 0.41 and 0.55 in that
+    this size. Effect: 0.3, 1 and 3 kg give impact forces of 91, 87 and 92 N and whirl ratios of 0.51, 0.41 and 0.54 in that
     bearing."""
 
     roller_diameter, pitch_diameter, radial_clearance = SI("mm"), SI("mm"), SI("mm")
@@ -255,7 +255,7 @@ class Cage(Consistent):
     imbalance_um: Annotated[float, Field(ge=0.0, le=5000.0)] = 0.0
     """Eccentricity of the cage's centre of mass, towards the first pocket. Typical: 0 to 100 um."""
     pocket_radial_clearance_mm: Positive | None = None
-    """Radial clearance between roller and pocket lips, where rollers guide the cage. Default: the pocket clearance. Without lips
+    """Distance between pocket lips less roller diameter, where rollers guide the cage. Default: the pocket clearance. Without lips
     such a cage would have no radial guidance, because free rollers give way along their orbit."""
     lands: Annotated[int, Field(ge=1, le=4)] = 2
     """Number of guide lands side by side."""

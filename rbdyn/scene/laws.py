@@ -58,8 +58,8 @@ class Laws(Consistent):
     (cage.bar_width_mm, bar_thickness_mm, bar_length_mm, side_ring_width_mm). Without a section: 5e7 N/m for metals (published:
     1e7 to 1e8), 2.5e6 N/m for polymers (modulus below 20 GPa), in proportion to the modulus. Estimate: a clamped bar has 192 E
     I/L^3 for a central load and 720 E I/L^3 for a uniform load, with I = thickness width^3/12; add the shear compliance in
-    series. Flexible side rings leave a quarter to a half of this. Effect: 1e7, 5e7 and 2e8 N/m give impact forces of 47, 86
-    and 118 N and whirl ratios of 0.42, 0.41 and 0.38 in the bearing of Chen et al. 2022."""
+    series. Flexible side rings leave a quarter to a half of this. Effect: 1e7, 5e7 and 2e8 N/m give impact forces of 47, 87
+    and 119 N and whirl ratios of 0.41, 0.41 and 0.39 in the bearing of Chen et al. 2022."""
     pocket_damping_alpha_s_m: NonNegative | None = None
     """Hunt and Crossley's alpha of the pocket walls; 0 is undamped. Default: 0.75 s/m. The restitution is 1 - alpha v, 0.5 to
     0.7 for steel on wet bronze at 0.5 m/s."""
