@@ -427,7 +427,7 @@ class BallScene(SceneFile):
     materials: BallMaterials = BallMaterials()
     """Materials of balls and rings."""
     lubricant: Lubricant | None = None
-    """Oil, for film thickness and life."""
+    """Oil, for film thickness and the heat balance."""
     errors: FormErrors | None = None
     """Form errors of grooves and balls, from which runout is computed. The equilibrium is computed without them."""
     mounting: Mounting | None = None

@@ -170,7 +170,7 @@ class Verdict(Sparse):
     the cage, rates over its speed."""
 
     trace: bool = True
-    """Whether runs trace the orbit of the cage, 64 samples a turn, and results state its class; false leaves both out. In a
+    """Whether runs trace the cage orbit, 64 samples a cage turn, and results state its class; false leaves both out. In a
     study all runs trace it if limits.cage.verdict names classes, otherwise only the confirmation runs."""
     still_radius: Share = Thresholds.still_radius
     """Rms radius of the orbit below which the cage is held. A cage is also held if the centre of its orbit is farther than
