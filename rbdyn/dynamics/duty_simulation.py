@@ -64,7 +64,7 @@ class SimulatedPoint(Record):
     ``figures``: by name, those of the parts included; empty where ``status`` says why there are none. ``L10_h``: life of ISO/TS 16281
     if the machine ran at this point alone, None where it has no end or is unknown. ``damage_share``: share of the damage over the
     duty. ``start``: how the machine comes to the point, where the duty states from which state.
-    duty. ``verdict``: class of the cage by its orbit, None where the scene leaves it out.
+    ``verdict``: class of the cage by its orbit, None where the scene leaves it out.
     """
 
     name: str
