@@ -67,15 +67,20 @@ def scene_at(path: Path, inputs: Sequence[Input], row: Mapping[str, Any], more: 
     return rbdyn.Scene.load(path, [*(f"{key}={value!r}" for key, value in values.items()), *more])
 
 
-def outputs_at(scenes: Sequence[rbdyn.Scene], workers: int) -> np.ndarray:
+def columns_of(study: Problem) -> list[str]:
+    """Outputs of every scene, and other responses of the study."""
+    return list(dict.fromkeys([*OUTPUTS, *study.responses]))
+
+
+def outputs_at(scenes: Sequence[rbdyn.Scene], names: Sequence[str], workers: int) -> np.ndarray:
     """Outputs (n, m) of scenes; NaN of one that fails."""
 
     def one(scene: rbdyn.Scene) -> list[float]:
         try:
-            record = rbdyn.simulate(scene, workers=1, notice=None).as_dict()
+            found = rbdyn.simulate(scene, workers=1, notice=None).responses
         except rbdyn.RunError:
-            return [math.nan] * len(OUTPUTS)
-        return [record[name]["value"] for name in OUTPUTS]
+            return [math.nan] * len(names)
+        return [found[name].value for name in names]
 
     first = one(scenes[0])  # compiles
     with ThreadPoolExecutor(workers) as pool:
@@ -106,7 +111,7 @@ def independent(
         at += [f"numerics.{each}" for each in RUNS]
         seeds = (f"numerics.seed={SEEDS + 10_000 * seed + place}" for place in range(sets))
         scenes = [scene_at(path, inputs, row, [*at, own]) for row, own in zip(rows, seeds, strict=True)]
-        found.append(outputs_at(scenes, workers))
+        found.append(outputs_at(scenes, columns_of(study), workers))
     return found[0], found[1]
 
 
@@ -127,7 +132,7 @@ def chances(study: Problem, base: np.ndarray, pick: np.ndarray, tool: Mapping[in
     names = list(next(iter(tool.values())).chances.gains)
     goals = {each.name: each.goal for each in study.file.response}
     side = [1.0 if goals[name] == "max" else -1.0 for name in names]
-    columns = [OUTPUTS.index(name) for name in names]
+    columns = [columns_of(study).index(name) for name in names]
     wins = (pick - base)[:, columns] * side > 0.0
     stated = {seed: [*each.chances.gains.values(), each.chances.all] for seed, each in tool.items()}
     for place, name in enumerate([*names, "all"]):

@@ -81,9 +81,11 @@ class Pooled:
         """The replicate after so many turns past the warm-up."""
         batches, run = batches_of(self.scene), self.run
         part = slice(self.skip, self.skip + batches.count(turns))
-        ends = slice(part.start, part.stop + 1)
-        names = ("durations", "whirl", "work", "largest", "cage_angle", "kinematic_angle")
-        arrays = {name: getattr(run, name)[part] for name in names}
+        ends, count = slice(part.start, part.stop + 1), len(run.durations)
+        over_batches = {
+            name: array for name, array in vars(run).items() if isinstance(array, np.ndarray) and len(array) == count
+        }
+        arrays = {name: array[part] for name, array in over_batches.items()}
         return replace(run, first=batches.first, energy=run.energy[ends], **arrays)
 
 
