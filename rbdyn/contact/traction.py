@@ -280,7 +280,6 @@ def _(model, along, across):
     i, j = int(along), int(across)
     # A row of its own would be counted by reference, in atomic instructions.
     c, k, y = model.cells, i * model.columns + j, across - j
-    # Neighbours in memory: the four share vector instructions.
     return (
         fma(fma(fma(c[k, 12], y, c[k, 8]), y, c[k, 4]), y, c[k, 0]),
         fma(fma(fma(c[k, 13], y, c[k, 9]), y, c[k, 5]), y, c[k, 1]),

@@ -13,9 +13,10 @@ from rbdyn.cli.app import app
 from rbdyn.compiled.kernel import alike, either, kernel
 from rbdyn.contact.hertz_line import LineContact, slice_contact
 from rbdyn.contact.traction import TractionSurface
+from rbdyn.dynamics.forces.bodies import RingMotion
 from rbdyn.dynamics.forces.cage import NoPocket, pocket_contact, pocket_gap
-from rbdyn.dynamics.forces.race_lanes import share_vectors
-from rbdyn.dynamics.forces.races import RoundRace
+from rbdyn.dynamics.forces.race_lanes import OnRing, open_contact, scratch, share_vectors, with_open_films
+from rbdyn.dynamics.forces.races import RoundRace, roller_radius
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.scene import Scene
 
@@ -33,6 +34,21 @@ def compiled_either(first, one, other):
 @njit
 def compiled_share(one, other):
     return share_vectors(one, other)
+
+
+@njit
+def compiled_films(bearing, ring, y, dy, space):
+    nothing = OnRing(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    z = bearing.rollers
+    return with_open_films(bearing.open_film, nothing, bearing.inner, bearing.sizes, ring, z, y, 0, dy, space)
+
+
+@njit
+def compiled_film(bearing, ring, y, j):
+    z = bearing.rollers
+    dx, dy, dvx, dvy = y[j] - ring.x, y[z + j] - ring.y, y[2 * z + j] - ring.vx, y[3 * z + j] - ring.vy
+    radius = roller_radius(bearing.sizes, j)
+    return open_contact(bearing.open_film, bearing.inner, radius, ring, dx, dy, dvx, dvy, y[4 * z + j])
 
 
 @njit
@@ -69,6 +85,28 @@ def test_unit_races_with_tables_and_elasticity_share_vectors():
     assert type(one) is TractionSurface and one.cells.shape != other.cells.shape
     assert bearing.outer.tangential.start != bearing.inner.tangential.start
     assert compiled_share(bearing.outer, bearing.inner)
+
+
+WAVES = "bearing.inner_waviness=[{order=3, amplitude_um=4.0}]"
+
+
+@pytest.mark.parametrize(
+    "assignments", [(), ("bearing.roller_diameter_spread_um=3.0", WAVES), ("bearing.tilt_mrad=2.0",)]
+)
+@pytest.mark.parametrize("layer", [(), ("lubricant.inlet_distance=5.0",)])
+def test_invariant_rollers_without_a_film_feel_nothing_of_it(make_scene, assignments, layer):
+    """Invariant: films leave out only rollers on which they act with nothing: those in contact and those too far away."""
+    bearing = roller_bearing(make_scene("model.open_contact_film=true", *assignments, *layer))
+    z, ring, draw = bearing.rollers, RingMotion(2e-6, -1e-6, 1e-3, 0.0, 2500.0, 1.0, 0.0), np.random.default_rng(4)
+    for _ in range(200):
+        angle, y = np.arange(z) * 2.0 * np.pi / z, draw.normal(0.0, 10.0, 5 * z + 10)
+        distance = bearing.inner.radius + 4.5e-3 + draw.uniform(-12e-6, 40e-6, z)
+        y[:z], y[z : 2 * z] = ring.x + distance * np.cos(angle), ring.y + distance * np.sin(angle)
+        rates = np.zeros((1, y.size))
+        sums = compiled_films(bearing, ring, y, rates, scratch(z))
+        each = np.array([compiled_film(bearing, ring, y, j) for j in range(z)])
+        assert np.array_equal(rates[0, 2 * z : 5 * z], each[:, :3].T.ravel())
+        assert sums[2] == pytest.approx(each[:, 3].sum(), rel=1e-12) and np.count_nonzero(each[:, 3]) > 0
 
 
 @pytest.mark.parametrize("assignments", [(), ("cage.guidance=roller", "cage.pocket_radial_clearance_mm=0.06")])
