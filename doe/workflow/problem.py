@@ -244,10 +244,14 @@ class Problem(Study):
 
     @cached_property
     def first_replicates(self) -> int:
-        """Replicates of a design run at first: all of them where few are more than half, or where a class of the cage needs all."""
+        """Replicates of a design run at first: all of them where few are more than half, or where there are limits.
+
+        The class of a cage needs all replicates, and noise widens the margin to a limit.
+        """
         fewest, usual = self.file.design.fewest_replicates, self.usual_replicates
         alike = all(scene.numerics.replicates == usual for scene in scenes_of(self.usual_run))
-        return fewest if alike and 2 * fewest <= usual and not self.file.limits.classes else usual
+        limited = bool(self.file.limits.classes or self.goals.limited)
+        return fewest if alike and 2 * fewest <= usual and not limited else usual
 
     def assignments(self, factors: Array) -> list[str]:
         """Overrides "key=value" of the scene at factor values (k,)."""

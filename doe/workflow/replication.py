@@ -5,7 +5,6 @@ A surface of p terms fitted to n runs averages their noise: its predictions at t
 
 from collections.abc import Sequence
 from dataclasses import replace
-from itertools import compress
 
 import numpy as np
 from scipy import special
@@ -56,14 +55,13 @@ def run_by_need(study: Problem, simulations: clearance.Simulations, progress: Pr
 
 
 def noisy(study: Problem, runs: Runs) -> list[str]:
-    """Responses with a goal or a limit whose predictions have too much noise, or an unknown amount."""
-    errors, goals = standard_errors(runs.errors, independent_values(runs)), study.goals
+    """Responses with a goal whose predictions have too much noise, or an unknown amount."""
+    errors = standard_errors(runs.errors, independent_values(runs))
     noise = np.ma.masked_invalid(errors**2).mean(axis=0).filled(np.inf)
     spread = np.ma.masked_invalid(runs.values).var(axis=0, ddof=1).filled(0.0)
     terms = np.array([len(terms_of(study, response.model)) for response in study.file.response])
-    counts = np.isfinite(goals.lower) | np.isfinite(goals.upper)
-    counts[goals.objectives] = True
-    return list(compress(study.responses, counts & (noise * terms / len(runs.coded) > NOISY * spread)))
+    hidden = noise * terms / len(runs.coded) > NOISY * spread
+    return [study.responses[place] for place in study.goals.objectives if hidden[place]]
 
 
 def _continued(study: Problem, runs: Runs, simulations: clearance.Simulations) -> Runs:

@@ -51,15 +51,17 @@ def test_unit_few_replicates_are_at_most_half(usual, first):
         assert [s.model_dump(exclude=excluded) for s in firsts] == [s.model_dump(exclude=excluded) for s in further]
 
 
-def test_unit_a_class_of_the_cage_needs_all_replicates():
-    """Plan: whether a design run has a class of the cage is judged by all its replicates."""
+def test_unit_a_limit_needs_all_replicates():
+    """Plan: a class of the cage is judged by all replicates, and noise widens the margin to the limit of a response."""
     study = with_replicates(8)
-    limited = study.with_file(limits=OtherLimits.model_validate({"cage": {"verdict": "held"}}))
-    assert (study.first_replicates, limited.first_replicates) == (4, 8)
+    held = study.with_file(limits=OtherLimits.model_validate({"cage": {"verdict": "held"}}))
+    limited = study.file.response[0].model_copy(update={"upper": 100.0})
+    bounded = study.with_file(response=[limited, *study.file.response[1:]])
+    assert [each.first_replicates for each in (study, held, bounded)] == [4, 8, 8]
 
 
 def test_unit_noise_of_predictions():
-    """Noise: predictions at the runs have p/n of the variance of a run's noise; responses without goal or limit do not count."""
+    """Noise: predictions at the runs have p/n of the variance of a run's noise; responses without a goal do not count."""
     study, random = with_replicates(8), np.random.default_rng(1)
     coded = study.design.coded
     spread = random.normal(100.0, 1.0, (RUNS, 3))
