@@ -250,8 +250,12 @@ class Problem(Study):
         """
         fewest, usual = self.file.design.fewest_replicates, self.usual_replicates
         alike = all(scene.numerics.replicates == usual for scene in scenes_of(self.usual_run))
-        limited = bool(self.file.limits.classes or self.goals.limited)
-        return fewest if alike and 2 * fewest <= usual and not limited else usual
+        return fewest if alike and 2 * fewest <= usual and not (self.is_limited or self.file.limits.classes) else usual
+
+    @property
+    def is_limited(self) -> bool:
+        """Whether any response has a limit."""
+        return any(response.lower is not None or response.upper is not None for response in self.file.response)
 
     def assignments(self, factors: Array) -> list[str]:
         """Overrides "key=value" of the scene at factor values (k,)."""

@@ -58,8 +58,7 @@ def study_stages(study: Problem, adaptive: bool = False, robust: bool = False) -
     # The pick by each rule, the one without its tolerances, and those of the surfaces and of the search.
     rules = len(get_args(Front.model_fields["pick"].annotation))
     points = rules + (study.file.front.tolerance_aware != "none") + 2 * adaptive
-    limited = any(response.lower is not None or response.upper is not None for response in study.file.response)
-    tries = study.file.confirmation.tries - 1 if limited else 0
+    tries = study.file.confirmation.tries - 1 if study.is_limited else 0
     most = points + tries + (len(study.factors) if adaptive else 0)
     # Picks by several rules may be one point of the drawing.
     titles = "confirmation", "beyond the region"
