@@ -161,7 +161,8 @@ def confirm(
 ) -> tuple[dict[str, Confirmed], list[Failure]]:
     """Simulate the choices with fresh seeds. Returns the simulated points, the ``baseline`` first, and the failures.
 
-    All but the pick and its tries are simulated in brief; their numerical errors are those of the baseline in proportion. Raises LostPickError where the pick cannot be simulated, InputError, KeyboardInterrupt.
+    All but the pick and its tries are simulated in brief; their numerical errors are those of the baseline in proportion. Raises
+    LostPickError where the pick cannot be simulated, InputError, KeyboardInterrupt.
     """
     brief = [name for name in choices if name != "pick" and not name.startswith(TRY)]
     runs = [study.confirmation_run(choice.point, in_brief=name in brief) for name, choice in choices.items()]

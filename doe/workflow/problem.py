@@ -253,6 +253,11 @@ class Problem(Study):
         return fewest if alike and 2 * fewest <= usual and not (self.is_limited or self.file.limits.classes) else usual
 
     @property
+    def further_replicates(self) -> int:
+        """Replicates that the first design runs leave out, 0 where they have all."""
+        return self.usual_replicates - self.first_replicates
+
+    @property
     def is_limited(self) -> bool:
         """Whether any response has a limit."""
         return any(response.lower is not None or response.upper is not None for response in self.file.response)
@@ -352,8 +357,8 @@ class Problem(Study):
         of the replicates that the first runs left out. Raises InputError, which names the point with an impossible value of a factor.
         """
         seed, places = self.file.design.seed + FURTHER_SEEDS * further, range(len(points)) if order is None else order
-        first, usual = self.first_replicates, self.usual_replicates
-        count = None if first == usual else usual - first if further else first
+        few = self.further_replicates if further else self.first_replicates
+        count = few if self.further_replicates else None
         return [self._design_run(point, seed + place, count) for place, point in zip(places, points, strict=True)]
 
     def _begun(self, run: Run) -> Run:

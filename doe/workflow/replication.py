@@ -45,7 +45,7 @@ def standard_errors(half_widths: Array, number: Whole) -> Array:
 def run_by_need(study: Problem, simulations: clearance.Simulations, progress: Progress, notice: Notice) -> Runs:
     """The design runs, with all their replicates where the first ones are too few; ``notice`` hears why. Raises as `run_design`."""
     runs = run_design(study, simulations, progress)
-    if study.first_replicates == study.usual_replicates or not (names := noisy(study, runs)):
+    if not study.further_replicates or not (names := noisy(study, runs)):
         return runs
     if notice is not None:
         notice(
@@ -73,12 +73,12 @@ def _continued(study: Problem, runs: Runs, simulations: clearance.Simulations) -
     found = simulations.run(scenes, labels, simulations.progress("design runs"))
     rows = [row for row, result in enumerate(found) if not isinstance(result, Failure)]
     sound = [result for result in found if not isinstance(result, Failure)]
-    first, usual = study.first_replicates, study.usual_replicates
+    usual = study.usual_replicates
 
     def joined(before: Runs, names: Sequence[str]) -> Runs:
         first_runs, (value, half_width, samples) = before.only(rows), clearance.figures(names, sound)
         further_runs = replace(first_runs, values=value, errors=half_width, replicates=samples)
-        mean = _mean(first_runs, further_runs, np.array([first, usual - first]) / usual)
+        mean = _mean(first_runs, further_runs, np.array([study.first_replicates, study.further_replicates]) / usual)
         values, errors, number = before.values.copy(), before.errors.copy(), independent_values(before)
         values[rows], errors[rows] = mean.value, mean.half_width
         number[rows] = np.where(np.isfinite(mean.freedom), np.round(mean.freedom) + 1.0, 0.0).astype(np.int64)

@@ -92,10 +92,12 @@ def run_design(study: Problem, simulations: clearance.Simulations, progress: Pro
     if failures and (lacking := _lacking(study, design, rows)):
         raise RunError(f"only {len(rows)} of {len(results)} design runs succeeded{lacking}: {sentence(failures)}")
     sound = [result for result in results if not isinstance(result, Failure)]
-    few = study.first_replicates < study.usual_replicates
     # Whether few replicates suffice is judged by what the surfaces make of them.
     notes = _distinct_notes(
-        [[note for note in result.notes if not few or note.code != "few-samples"] for result in sound]
+        [
+            [note for note in result.notes if not study.further_replicates or note.code != "few-samples"]
+            for result in sound
+        ]
     )
     if failures:
         added = len(results) - planned

@@ -38,7 +38,7 @@ def study_stages(study: Problem, adaptive: bool = False, robust: bool = False) -
     The most runs of a stage include the further points that a broken limit may need.
     """
     works = dict(design_works(study))
-    most_runs = None if study.first_replicates == study.usual_replicates else 2 * len(works)
+    most_runs = 2 * len(works) if study.further_replicates else None
     confirmation = study.confirmation_run(study.baseline)
     stages = [
         _stage_of(BASELINE, 1, confirmation, BASELINE, fewest=1),

@@ -50,6 +50,10 @@ class CoulombTraction(NamedTuple):
     blend_speed: float  # u_r [m/s]
 
 
+# Laws without a table.
+TABLELESS = (NoTraction, FourConstantTraction, BlendedFourConstantTraction, CoulombTraction)
+
+
 class SurfaceAxes(NamedTuple):
     """Axes of the table of a ``TractionSurface``."""
 
@@ -225,7 +229,7 @@ def without_table(model):
     """A law as scalars: ``SurfaceAxes`` replace its table, for ``table_place`` and ``traction_by_table``."""
 
 
-@without_table.body(NoTraction, FourConstantTraction, BlendedFourConstantTraction, CoulombTraction)
+@without_table.body(*TABLELESS)
 def _(model):
     return model
 
@@ -299,7 +303,7 @@ def traction_by_table(model, slip, load, value):
     """``traction`` of a law without its table, from the value of the table."""
 
 
-@traction_by_table.body(NoTraction, FourConstantTraction, BlendedFourConstantTraction, CoulombTraction)
+@traction_by_table.body(*TABLELESS)
 def _(model, slip, load, value):
     return traction(model, slip, load)
 
@@ -320,7 +324,7 @@ def growth_by_table(model, slip, load, value, slope):
     """``growth`` of a law without its table, from value and slope of its ``table_cubic``."""
 
 
-@growth_by_table.body(NoTraction, FourConstantTraction, BlendedFourConstantTraction, CoulombTraction)
+@growth_by_table.body(*TABLELESS)
 def _(model, slip, load, value, slope):
     return growth(model, slip, load)
 

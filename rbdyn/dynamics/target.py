@@ -326,7 +326,9 @@ def _shortfall(target: float, errors: dict[str, float | None], result: Simulatio
     """Note on the figure that missed the target most, and on what limits it."""
     unknown = [name for name, error in errors.items() if error is None]
     if unknown:
-        return Note("target", f"target: {100.0 * target:g} % is not met: {', '.join(unknown)} has no relative error")
+        return Note(
+            "target", f"target: {100.0 * target:g} % is not met: the relative error of {', '.join(unknown)} is unknown"
+        )
     worst = max(errors, key=lambda name: errors[name] or 0.0)
     figure = result.figures[worst]
     statistical, numerical = figure.statistical_error or 0.0, figure.numerical_error or 0.0

@@ -32,11 +32,8 @@ from rbdyn.contact.tangential import (
     steady_by_table,
 )
 from rbdyn.contact.traction import (
-    BlendedFourConstantTraction,
-    CoulombTraction,
-    FourConstantTraction,
+    TABLELESS,
     MixedTraction,
-    NoTraction,
     SurfaceAxes,
     TractionSurface,
     cubic,
@@ -136,16 +133,7 @@ def in_vectors(parameters):
 
 
 @in_vectors.body(
-    LineContact,
-    PowerLineContact,
-    LogarithmicLineContact,
-    RoundRace,
-    NoTraction,
-    FourConstantTraction,
-    BlendedFourConstantTraction,
-    CoulombTraction,
-    SurfaceAxes,
-    TractionSurface,
+    LineContact, PowerLineContact, LogarithmicLineContact, RoundRace, *TABLELESS, SurfaceAxes, TractionSurface
 )
 def _(parameters):
     return True
@@ -259,7 +247,7 @@ def keep_place(traction_model, slip, load, met, i):
     """Write the place of lane ``i`` in the table of a law."""
 
 
-@keep_place.body(NoTraction, FourConstantTraction, BlendedFourConstantTraction, CoulombTraction)
+@keep_place.body(*TABLELESS)
 def _(traction_model, slip, load, met, i):
     pass
 
@@ -298,7 +286,7 @@ def look_up(traction_model, met, first, count):
     """Write the cubics along the slip of the lanes from ``first`` to ``count``, whose place in the cell replaces that in the table."""
 
 
-@look_up.body(NoTraction, FourConstantTraction, BlendedFourConstantTraction, CoulombTraction)
+@look_up.body(*TABLELESS)
 def _(traction_model, met, first, count):
     pass
 
@@ -322,7 +310,7 @@ def from_table(traction_model, met, i):
     """Value and slope over the slip at lane ``i`` from the table of a law, after ``look_up``; 0 without a table."""
 
 
-@from_table.body(NoTraction, FourConstantTraction, BlendedFourConstantTraction, CoulombTraction)
+@from_table.body(*TABLELESS)
 def _(traction_model, met, i):
     return 0.0, 0.0
 
