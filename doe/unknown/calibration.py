@@ -42,6 +42,7 @@ from doe.unknown.posterior import (
     sampled,
     unseen_offsets,
 )
+from doe.unknown.propagation import MEDIAN_FIRST
 from doe.unknown.width import Power, Scores, Width, prequential, scores_of, width
 from rbdyn.base.arrays import Array, Mask, Whole
 from rbdyn.base.records import Record, keyed
@@ -255,7 +256,6 @@ ENOUGH, INSIDE = 3, 0.9
 FAR, MOST = 3.0, 1e6
 # Draws of a cell, draws of a row for its width, and particles of each power that these are drawn from.
 PREDICTION_DRAWS, WIDTH_DRAWS, ENOUGH_OF = 800, 2000, 2000
-ENDS = (0.5, 0.05, 0.95)
 
 JointAt = Callable[[Array], Joint]
 
@@ -404,7 +404,7 @@ def explanations(names: Sequence[str], match: Matched, points: Array, seed: int)
     for place, name in enumerate(names):
         cell = int(np.flatnonzero(measured.output == place)[0])
         biases = latent[:, place] * joint.roots[:, cell, place]
-        median, low, high = np.quantile(biases, ENDS).tolist()
+        median, low, high = np.quantile(biases, MEDIAN_FIRST).tolist()
         scale, accuracy = float(measured.scales[place]), float(measured.accuracy[place])
         factor = None if scale == 0.0 else bayes_factor(float(beyond[:, place].mean()), 2.0 * BEYOND)
         listed.append(Explanation(name, (median, low, high), scale, accuracy, factor, unseen[place]))

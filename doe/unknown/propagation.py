@@ -40,8 +40,8 @@ from rbdyn.base.records import Record
 
 # An emulator is trusted that predicts this share of what noise leaves to predict.
 TRUSTED = 0.8
-# Ends of the range, and how many resamplings give their errors.
-ENDS, REWEIGHTINGS = (0.05, 0.5, 0.95), 64
+# Ends of a range and its middle, in the order of two forms, and how many resamplings give the errors of the ends.
+ENDS, MEDIAN_FIRST, REWEIGHTINGS = (0.05, 0.5, 0.95), (0.5, 0.05, 0.95), 64
 
 
 class Share(NamedTuple):

@@ -30,7 +30,7 @@ from doe.workflow.runs import Runs
 from rbdyn.base.arrays import Array, Whole, one_thread
 from rbdyn.base.faults import InputError, MethodError, RunError, refuse
 from rbdyn.base.records import Record
-from rbdyn.base.words import counted
+from rbdyn.base.words import NORMAL, counted
 
 SIGNIFICANT = 0.05
 # Share of the half range of the region within which points are twins, if the drawing has no resolution.
@@ -289,7 +289,7 @@ def compare_fronts(study: Problem, adaptive: Adaptive, on_surfaces: Array) -> Fr
         nadir,
         [hypervolume(goals.costs(search.emulators.predict(points)[0]), *scale) for points in search.fronts],
         hypervolume(predicted_costs(study, adaptive, on_surfaces), *scale),
-        FreshVolume(fresh, 1.96 * error),
+        FreshVolume(fresh, NORMAL * error),
     )
 
 

@@ -24,7 +24,6 @@ from doe.unknown.posterior import Measured
 from doe.unknown.width import OFTEN, power_of
 from doe.workflow.identification import BEFORE, Calibration, Design, Evidence, identified
 from doe.workflow.input_sets import (
-    NORMAL,
     Case,
     case_of,
     check_holes,
@@ -43,7 +42,7 @@ from rbdyn.base.arrays import Array, one_thread
 from rbdyn.base.faults import Claims, InputError, RunError, key_path, refuse
 from rbdyn.base.files import code_version, digest_of
 from rbdyn.base.notes import Note, Notes
-from rbdyn.base.words import counted
+from rbdyn.base.words import NORMAL, counted
 from rbdyn.result import TEMPERATURES, SimulationResult
 from rbdyn.scene import Scene
 from rbdyn.scene.thermal import first_guess_faults

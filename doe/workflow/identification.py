@@ -11,6 +11,7 @@ import numpy as np
 from doe.unknown import inputs as unknown
 from doe.unknown.calibration import FAR, MISSED, Explanation, Judgement, Matched, Trial, judge, objections, reweighed
 from doe.unknown.posterior import Learnt, contraction, contraction_words, densest_intervals, learnt
+from doe.unknown.propagation import ENDS, MEDIAN_FIRST
 from doe.unknown.width import Power
 from doe.workflow.input_sets import Case, laws_of
 from doe.workflow.rig import Rig
@@ -25,8 +26,6 @@ from rbdyn.scene.unknown import Input, value_of
 CALIBRATED, NOT_CALIBRATED, UNDECIDABLE = "calibrated", "not calibrated", "cannot be judged by this design"
 # Rows of the posterior sample, its file, and input sets of the prior.
 SAMPLE, SAMPLE_FILE, BEFORE = 1000, "posterior.csv", 2000
-# Quantiles of a prediction and of a discrepancy.
-ENDS, TAUS = (0.05, 0.5, 0.95), (0.5, 0.05, 0.95)
 
 Quantiles = tuple[float, float, float]
 
@@ -209,7 +208,7 @@ def identified(evidence: Evidence) -> Calibration:
         contradictions += objections(judgement, anything=gained.anything, emulated=match.misfit < MISSED)
         after = match.cells.mean(evidence.quantiles)
         notes = (*notes, *map(_narrow, gained.narrow))
-        taus = np.quantile(match.errors(evidence.points).level, TAUS, axis=0).T.tolist()
+        taus = np.quantile(match.errors(evidence.points).level, MEDIAN_FIRST, axis=0).T.tolist()
         discrepancy = dict(zip(rig.outputs, taus, strict=False))
     cells = [_cell(evidence, place, judgement, after) for place in range(len(evidence.cells))]
     far = [] if judgement is None else np.flatnonzero(np.abs(judgement.residuals) > FAR).tolist()

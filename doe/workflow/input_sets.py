@@ -42,8 +42,7 @@ from rbdyn.scene.unknown import Input, documented_of, inputs_of, is_number, put,
 
 HOLES = 0.05  # share of input sets that may be impossible or fail
 SCREENING_SEEDS = 500_000
-NORMAL = 1.96  # half-width of a 95 % interval over its standard deviation
-ENDS = np.array([1e-3, 1.0 - 1e-3])  # quantiles at which a law's scenes must be possible: no plan goes farther out
+FARTHEST = np.array([1e-3, 1.0 - 1e-3])  # quantiles at which a law's scenes must be possible: no plan goes farther out
 CHECKS = 16  # input sets that are checked before anything runs
 ROUND_SEEDS = 10_000  # of further replicates of the same input sets
 
@@ -379,7 +378,7 @@ def _impossible_values(case: Case) -> Iterator[str]:
         if unknown_input.key in case.sample or unknown_input.reason != "declared":
             continue
         choices = unknown_input.law.values if unknown_input.law.law == "choices" else None
-        for value in choices or dict.fromkeys(unknown.values_of(unknown_input.law, ENDS)):
+        for value in choices or dict.fromkeys(unknown.values_of(unknown_input.law, FARTHEST)):
             (scene,) = case.scenes([unknown_input], [{unknown_input.key: value}], 0)
             if isinstance(scene, str):
                 yield f'{case.home}: uncertain."{unknown_input.key}" at {shown(value)}: {_bare(case, scene)}; change its law'

@@ -14,6 +14,7 @@ from doe.workflow.problem import Problem
 from doe.workflow.surface_front import EstimatedPoint
 from rbdyn.base.arrays import Rows
 from rbdyn.base.records import Record, derived, keyed
+from rbdyn.base.words import NORMAL
 
 
 class SearchedPoint(EstimatedPoint):
@@ -203,7 +204,7 @@ class SearchResult(Record, kw_only=True):
             fresh=search.fresh,
             hypervolume=search.history[-1].reached,
             hypervolume_fresh=fresh,
-            hypervolume_fresh_error=1.96 * fresh_error,
+            hypervolume_fresh_error=NORMAL * fresh_error,
             history=list(search.history),
             stopped=search.stopped,
             extended=[
@@ -245,5 +246,5 @@ def predicted_rows(
 ) -> list[dict[str, float | None]]:
     """Rows of the front that the emulators predict, all by default, with 95 % half widths."""
     search = adaptive.search
-    parts = zip(search.archive[rows], search.predictions[rows], 1.96 * search.deviations[rows], strict=True)
+    parts = zip(search.archive[rows], search.predictions[rows], NORMAL * search.deviations[rows], strict=True)
     return [EstimatedPoint.of(study, study.rounded(point), *figures).row for point, *figures in parts]

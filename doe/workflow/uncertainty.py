@@ -23,7 +23,6 @@ from doe.unknown.propagation import (
     variance_by_cause,
 )
 from doe.workflow.input_sets import (
-    NORMAL,
     Case,
     Sets,
     declared,
@@ -37,7 +36,7 @@ from rbdyn.base.arrays import Array, one_thread
 from rbdyn.base.faults import LONGEST_NAME, RunError, one_line, refuse
 from rbdyn.base.notes import Note, Notes
 from rbdyn.base.records import Record, derived, outside_json, spread
-from rbdyn.base.words import are, counted
+from rbdyn.base.words import NORMAL, are, counted
 from rbdyn.dynamics.figures import FIGURES, of_kind, why_missing
 from rbdyn.result import TEMPERATURES, Quantity, SimulationResult
 from rbdyn.scene.unknown import UnknownInput

@@ -17,11 +17,11 @@ import numpy as np
 from studies import main
 
 from rbdyn.accuracy.report import Progress, Report, Reporter, flat, records, reported
-from rbdyn.accuracy.tolerances import MARGIN, NORMAL, OUTPUTS, about, percent
+from rbdyn.accuracy.tolerances import MARGIN, OUTPUTS, about, percent
 from rbdyn.base.arrays import Array
 from rbdyn.base.blocks import Column, Sheet, columns_of
 from rbdyn.base.records import Record, shown
-from rbdyn.base.words import with_error
+from rbdyn.base.words import NORMAL, with_error
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.recording import run_series

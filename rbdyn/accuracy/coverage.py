@@ -12,7 +12,7 @@ from typing import Any
 from rbdyn.accuracy.report import Progress, Report, Reporter, records, reported
 from rbdyn.base.blocks import Sheet, columns_of
 from rbdyn.base.records import Record, shown
-from rbdyn.base.words import error_alone, value_alone, with_error
+from rbdyn.base.words import NORMAL, error_alone, value_alone, with_error
 from rbdyn.dynamics.ensemble import in_turn
 from rbdyn.dynamics.figures import BEARING
 from rbdyn.dynamics.run import with_numerics
@@ -134,7 +134,7 @@ def pooled(rows: list[Row]) -> float:
 def conclusion(rows: list[Row], repeats: int) -> str:
     """Whether the intervals cover the truth as often as they claim."""
     low, high = POOLED
-    share, scatter = pooled(rows), 1.96 * math.sqrt(0.95 * 0.05 / repeats)
+    share, scatter = pooled(rows), NORMAL * math.sqrt(0.95 * 0.05 / repeats)
     narrow = [f"{one.figure} {one.covered:.2f}" for one in rows if one.covered < LOWEST]
     over_all = f"Pooled over the results {share:.3f} ({with_error(0.95, scatter)} for a sound interval of one result)"
     if narrow:

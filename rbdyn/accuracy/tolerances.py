@@ -24,7 +24,7 @@ from rbdyn.accuracy.report import Progress, Report, Reporter, flat, record, reco
 from rbdyn.base.blocks import Column, Sheet, Table, columns_of
 from rbdyn.base.faults import InputError, RunError
 from rbdyn.base.records import Record, shown
-from rbdyn.base.words import signed_with_error
+from rbdyn.base.words import NORMAL, signed_with_error
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.figures import FIGURES
 from rbdyn.dynamics.parameters.model import roller_bearing
@@ -38,7 +38,6 @@ Verdict = Literal["within", "beyond", "undecided"]
 
 # Relative differences up to this do not matter: two bearings of one lot differ by more.
 MARGIN = 0.01
-NORMAL = 1.96
 # From so many replicates on Student's factor equals that of the normal distribution to two digits.
 MANY = 100
 

@@ -14,6 +14,7 @@ UNITS = {
     "kg_mm2": "kg mm²", "kg_m3": "kg/m³", "C": "°C", "K": "K", "per_K": "1/K", "1e_6_K": "1e-6/K", "percent": "%",
     "W_mK": "W/(m K)", "J_kgK": "J/(kg K)",
 }  # fmt: skip
+NORMAL = 1.96  # half-width of a 95 % interval over its standard error, of many degrees of freedom
 MOST_PARTS = 3
 # Whole names that end like a unit and have none.
 UNITLESS = {"mu_m"}

@@ -397,7 +397,7 @@ def _target_sentence(target: dict[str, Any]) -> str:
 
 # Figures of a point on the screen by the heading of their column, and their factor; all of them stand in points.csv.
 SHOWN = {figure.panel[1]: (figure.key, figure.percent) for figure in BEARING if figure.panel}
-CLEARANCES = {figure.source[0]: (figure.key, 1.0) for figure in of_kind("clearance")}
+CLEARANCE_COLUMNS = {figure.source[0]: (figure.key, 1.0) for figure in of_kind("clearance")}
 
 
 class MapDuty(Record):
@@ -484,12 +484,12 @@ def _place(scene: Scene) -> tuple[float, float]:
 
 def simulated_blocks(found: "DutySimulation") -> list[Block]:
     """The verdict, the worst points in words, figures and clearances in operation at each point, lives, notes."""
-    names = [name for name, _ in (*SHOWN.values(), *CLEARANCES.values()) if name in found.worst]
+    names = [name for name, _ in (*SHOWN.values(), *CLEARANCE_COLUMNS.values()) if name in found.worst]
     lifeless = [point.name for point in found.points if point.L10_h is None and point.status != "ok"]
     blocks = [
         Paragraph(f"Worst: {', '.join(_worst(name, found.worst[name]) for name in names)}." if names else ""),
         _point_table("Figures", found, SHOWN, cage_column()),
-        _point_table("Clearances in operation [µm]", found, CLEARANCES),
+        _point_table("Clearances in operation [µm]", found, CLEARANCE_COLUMNS),
         *_point_starts(found),
         *duty_blocks(found.points, found.life or {}),
         Paragraph("" if found.life else f"Life over the duty: unknown, because {', '.join(lifeless)} has none."),

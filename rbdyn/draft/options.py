@@ -15,7 +15,7 @@ from rbdyn.properties.oils import NamedOil, oil_named
 from rbdyn.scene.lubricant import SUPPLIES
 
 Value = TypeVar("Value")
-ROLLER_DIAMETERS, ROLLER_LENGTHS, CLEARANCES = (1.0, 150.0), (0.5, 400.0), (-0.2, 2.0)
+ROLLER_DIAMETERS, ROLLER_LENGTHS, CLEARANCE_LIMITS = (1.0, 150.0), (0.5, 400.0), (-0.2, 2.0)
 CONFORMITIES = (0.501, 0.7)
 ROLLER = re.compile(r"\s*([\d.]+)\s*[xX\u00d7*]\s*([\d.]+)\s*(?:mm)?\s*")
 POLYAMIDE_NAME = "polyamide"
@@ -77,7 +77,7 @@ def clearance_of(text: str) -> str | float:
         return name
 
     def fault(value: float) -> str | None:
-        sentence = _range_fault(value, *CLEARANCES, "mm")
+        sentence = _range_fault(value, *CLEARANCE_LIMITS, "mm")
         um = f"if {value:g} um are meant, write {1e-3 * value:g}"
         return sentence.replace("fix it", um) if sentence and 2.0 < value <= 2000.0 else sentence
 

@@ -272,9 +272,9 @@ def quantile(sums: Array) -> Array:
     """Value that 95 % of the samples stay below, from a histogram after two numbers on the last axis; 0 without samples."""
     counts = sums[..., 2:]
     shares = np.cumsum(counts, axis=-1) / np.maximum(sums[..., :1], 1.0)
-    place = np.argmax(shares >= LEVEL - 1e-12, axis=-1)[..., None]
+    place = np.argmax(shares >= SAMPLE_QUANTILE - 1e-12, axis=-1)[..., None]
     own = np.maximum(np.take_along_axis(counts, place, -1) / np.maximum(sums[..., :1], 1.0), 1e-300)
-    inside = 1.0 - (np.take_along_axis(shares, place, -1) - LEVEL) / own
+    inside = 1.0 - (np.take_along_axis(shares, place, -1) - SAMPLE_QUANTILE) / own
     values = SAMPLE_LOWEST * 10.0 ** ((place + np.clip(inside, 0.0, 1.0)) / SAMPLE_STEPS)
     # The first step holds all that is smaller.
     return np.where((sums[..., 0] > 0.5) & (place[..., 0] > 0), values[..., 0], 0.0)
@@ -301,7 +301,7 @@ def _sampled(place: int, key: str, meaning: str, unit: str, level: bool, scale: 
     )
 
 
-LEVEL = 0.95
+SAMPLE_QUANTILE = 0.95
 
 
 def _mean_or_none(sums: Array) -> Array:

@@ -21,9 +21,9 @@ from rbdyn.result import Quantity
 from rbdyn.scene import Scene
 from rbdyn.scene.thermal import Temperatures, at_temperatures
 
-CLEARANCES, CONTACTS, (LIFE,) = of_kind("clearance"), of_kind("contact"), of_kind("life")
+GAPS, CONTACTS, (LIFE,) = of_kind("clearance"), of_kind("contact"), of_kind("life")
 STIFFNESS = [figure.key for figure in of_kind("stiffness")]
-EXACT = [*(figure.key for figure in (*CLEARANCES, LIFE)), *STIFFNESS]
+EXACT = [*(figure.key for figure in (*GAPS, LIFE)), *STIFFNESS]
 
 
 def races_of(scene: Scene, runs: Runs) -> dict[str, dict[str, float]]:
@@ -91,7 +91,7 @@ def at_temperatures_with_errors(
 def _exact(scene: Scene) -> dict[str, float]:
     """Operating clearances [um] of a scene, its life [h] and stiffness [N/um], by the key of their figure."""
     gaps = scene.clearances
-    figures = {figure.key: 1e6 * gap.operating for figure in CLEARANCES if (gap := gaps[figure.source[0]]) is not None}
+    figures = {figure.key: 1e6 * gap.operating for figure in GAPS if (gap := gaps[figure.source[0]]) is not None}
     hours = static_life(scene).hours(*scene.operation.speeds)
     return figures | ({LIFE.key: hours} if math.isfinite(hours) else {}) | _stiffness(scene)
 

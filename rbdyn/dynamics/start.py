@@ -18,6 +18,7 @@ from rbdyn.base.arrays import Array
 from rbdyn.base.faults import RPM, InputError, RunError
 from rbdyn.base.notes import Note, Notes, status_notes
 from rbdyn.base.records import finite
+from rbdyn.base.words import NORMAL
 from rbdyn.clearances import DIFFERENCE
 from rbdyn.dynamics.figures import POWER_LOSS
 from rbdyn.dynamics.parameters.heat import loss_levels, term_shares
@@ -430,7 +431,7 @@ def _share_error(share: float) -> float:
     """Half-width of the 95 % interval of a share of ``SETS`` (Agresti and Coull)."""
     count = SETS + 4.0
     middle = (share * SETS + 2.0) / count
-    return 1.96 * math.sqrt(middle * (1.0 - middle) / count)
+    return NORMAL * math.sqrt(middle * (1.0 - middle) / count)
 
 
 def _rough(machine: Machine, law: Law, capacities: Array) -> tuple[dict[str, Array], dict[str, Array]]:

@@ -19,7 +19,7 @@ import numpy as np
 from rbdyn.base.arrays import Array
 from rbdyn.base.faults import LONGEST_NAME, InputError, one_line
 from rbdyn.base.notes import Note
-from rbdyn.base.words import Notice, counted
+from rbdyn.base.words import NORMAL, Notice, counted
 from rbdyn.dynamics.ensemble import Reporter, Stop, plan_of, threads_of
 from rbdyn.dynamics.figures import FIGURES
 from rbdyn.dynamics.parameters.model import roller_bearing
@@ -50,7 +50,6 @@ MARGIN = 0.9
 MOST_RUNS = 3
 # Counted turns of one run at most: minutes.
 MOST_TURNS = 100_000.0
-NORMAL = 1.96
 # A difference that is all scatter and its standard error together, over its 95 % half-width: sqrt(2) / 1.96.
 NOISY_DIFFERENCE = 0.722
 # Costs that add up over runs; the others are those of the reported run.

@@ -339,7 +339,7 @@ def _draw_classes(axis: Axes, slip_map: "SlipMap", below: float) -> None:
 
 
 # Clearances of a picture over the operating or the drawn one, whichever is larger, and how many of them.
-CLEARANCES, CLEARANCE_POINTS = (-0.5, 2.0), 26
+CLEARANCE_SPAN, CLEARANCE_POINTS = (-0.5, 2.0), 26
 
 
 def stiffness_over_clearance(scene: "Scene", path: Path) -> None:
@@ -349,7 +349,7 @@ def stiffness_over_clearance(scene: "Scene", path: Path) -> None:
     """
     operating = scene.geometry.clearance
     largest = max(abs(operating), abs(scene.bearing.radial_clearance), 1e-6)
-    clearances = np.sort([*np.linspace(*CLEARANCES, CLEARANCE_POINTS) * largest, operating])
+    clearances = np.sort([*np.linspace(*CLEARANCE_SPAN, CLEARANCE_POINTS) * largest, operating])
     rows = [stiffness_row(scene, float(clearance)) for clearance in clearances]
     figure, (above, below) = plt.subplots(2, 1, figsize=(6.4, 5.6), sharex=True)
     here = stiffness_row(scene, operating)

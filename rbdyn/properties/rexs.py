@@ -51,7 +51,7 @@ POINT = {
     "--oil-flow": ("lubricant_flow_through_bearing",),
 }
 # Roles of components that belong to a bearing, the shaft in its bore among them.
-PARTS = ("part", "inner_part")
+BEARING_ROLES = ("part", "inner_part")
 NAMES = ("catalogue_designation", "name")
 COUNT, CIRCLE = "number_of_rolling_elements", "reference_diameter_rolling_bearing"
 VISCOSITY = "viscosity_at_40_degree_celsius"
@@ -174,7 +174,7 @@ def _components(path: Path) -> tuple[dict[str, Component], dict[str, list[str]]]
         if relation.tag.rpartition("}")[2] == "relation":
             refs = {ref.get("role", ""): ref.get("id", "") for ref in relation}
             for role, number in refs.items():
-                if role in PARTS:
+                if role in BEARING_ROLES:
                     inside.setdefault(refs.get("assembly", ""), []).append(number)
     return components, inside
 

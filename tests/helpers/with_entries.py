@@ -111,12 +111,12 @@ def clearance() -> dict[str, bool]:
     from doe.report.sections.answer import MEANINGS
     from doe.workflow.whole import NAMES
     from rbdyn.clearances import other_ranges
-    from rbdyn.cli.simulation_output import CLEARANCES
+    from rbdyn.cli.simulation_output import CLEARANCE_COLUMNS
 
     tables = {"bearing": {"axial_clearance_mm": 0.2}, "cage": {"guidance": "outer"}}
     return {
         "responses": "axial_operating_clearance_um" in responses_of(heats=False),
-        "duty": CLEARANCES["axial"][0] == "axial_operating_clearance_um",
+        "duty": CLEARANCE_COLUMNS["axial"][0] == "axial_operating_clearance_um",
         "ranges": "axial clearance 1 to 3 µm" in other_ranges({"axial_um": (1.0, 2.0, 3.0)}),
         "factor": [(one.name, one.step) for one in _factors(tables)] == [("axial_clearance_mm", 0.08)],
         "study": NAMES["bearing.axial_clearance_mm"] == "axial",

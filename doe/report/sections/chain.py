@@ -25,7 +25,7 @@ from rbdyn.base.blocks import (
     columns_of,
     within,
 )
-from rbdyn.base.words import counted, label, with_error
+from rbdyn.base.words import NORMAL, counted, label, with_error
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -39,7 +39,6 @@ FILLS = (
     ("#6b3a59", "#fefefe"), ("#e69f00", "#111111"), ("#006b4f", "#fefefe"), ("#e5a9cb", "#111111"),
 )  # fmt: skip
 KINDS = (("variance_percent", "variance"), ("worst_case_percent", "worst case"))
-NORMAL = 1.96  # half-width of a 95 % interval over its standard error
 # A part of a chain: the names of both, and its size.
 SizeRow = tuple[str, str, AllocatedSize]
 NAMES: tuple[Column[Any], ...] = (Column("chain", label, at=0, meaning="names"), Column("part", label, at=1))

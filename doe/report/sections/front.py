@@ -23,7 +23,7 @@ from doe.workflow.surface_front import (
 )
 from doe.workflow.surfaces import PredictedGain
 from rbdyn.base.blocks import Block, Bullets, Column, Detail, Figures, Paragraph, Section, Sheet, Table, Widget
-from rbdyn.base.words import chance, counted, error_alone, label, quantity, shown, with_error
+from rbdyn.base.words import NORMAL, chance, counted, error_alone, label, quantity, shown, with_error
 
 # Points of a front that are drawn; more cannot be told apart.
 MOST_POINTS = 400
@@ -190,7 +190,7 @@ def _doubt(result: SurfaceFront) -> list[Block]:
         f"{quantity(name)[0]} {percent:+.2f} %" for name, percent in optimism.items() if percent is not None
     )
     dominance = result.pick_dominates_baseline
-    odds = with_error(dominance.probability, 1.96 * dominance.standard_error)
+    odds = with_error(dominance.probability, NORMAL * dominance.standard_error)
     pick = "The selected design" if result.tolerance_aware is None else f"The {WITHOUT}"
     return [
         Paragraph(f"Selection bias to expect in these gains: {biases}." if biases else ""),
