@@ -394,7 +394,7 @@ class Problem(Study):
 
     def _confirmation_scene(self, point: Array, sets: Sequence[str], in_brief: bool = False) -> Scene:
         settings, seed = self.file.confirmation, self.file.design.seed + CONFIRMATION_SEEDS
-        replicates = min(self.usual_replicates, settings.replicates) if in_brief else settings.replicates
+        replicates = min(self.first_replicates, settings.replicates) if in_brief else settings.replicates
         effort = [f"numerics.replicates={replicates}", f"numerics.companion={str(not in_brief).lower()}"]
         scene = self.scene_at(point, seed, [*sets, *effort, *settings.set], confirms=True)
         needed = scene.verdict.limits.fewest_replicates

@@ -129,12 +129,12 @@ def test_unit_noisy_runs_continue(tmp_path, monkeypatch, scatter, counts):
 
 
 def test_unit_other_points_are_confirmed_in_brief():
-    """Confirmation: the pick and its tries have all replicates and companions; other points those of a design run, and the numerical
+    """Confirmation: the pick and its tries have all replicates and companions; other points the first ones of a design run, and the numerical
     errors of the baseline in proportion."""
     study = with_replicates(8)
     full, brief = (study.confirmation_run(study.centre, in_brief=brief).numerics for brief in (False, True))
     assert (full.replicates, full.companions) == (study.file.confirmation.replicates, 4)
-    assert (brief.replicates, brief.companions, brief.seed) == (8, 0, full.seed)
+    assert (brief.replicates, brief.companions, brief.seed) == (study.first_replicates, 0, full.seed) == (4, 0, full.seed)
 
     class Runs:
         def progress(self, title):
@@ -151,7 +151,7 @@ def test_unit_other_points_are_confirmed_in_brief():
     assert not failures
     assert {name: point.result.replicates for name, point in points.items() if name != "baseline"} == {
         "pick": 16,
-        "desirability": 8,
+        "desirability": 4,
         "try_1": 16,
     }
     assert np.isnan(points["pick"].numerical).all()
