@@ -194,6 +194,10 @@ class Interval(NamedTuple):
         """'71.3 to 99.8 %'."""
         return f"{percent(self.low)} to {percent(self.high)} %"
 
+    def containing(self, share: float | None) -> "Interval":
+        """The interval, widened to the ``share`` on the mean surfaces, if known: the shortest one may leave it out."""
+        return self if share is None else Interval(min(self.low, share), max(self.high, share))
+
 
 def interval_of_share(hits: Array, parts: int) -> Interval:
     """Interval of a share from the hits (d,) among ``parts`` parts on each draw."""

@@ -155,7 +155,8 @@ class _Parts:
         if self.count_on_draws is None:
             return interval_of_share(np.array([self.keep(half).all(axis=1).sum()]), len(self.offsets))
         some = self.offsets[:MOST_JUDGED]
-        return interval_of_share(self.count_on_draws(self.centre + half * some), len(some))
+        interval = interval_of_share(self.count_on_draws(self.centre + half * some), len(some))
+        return interval.containing(self.share(half))
 
     def most_broken(self, half: Array) -> str:
         """The limit that most parts break."""

@@ -101,14 +101,10 @@ def with_survival(study: Problem, pareto: ParetoFront, confirmed: Mapping[str, C
     aware = pareto.tolerance_aware
     if aware is None:
         return pareto
-    draws = draws_of(study, confirmed)
-    plain, pick = (
-        survival(study, draws, point, aware.box)
-        for point in (study.coded(pareto.points[pareto.pick]), aware.points[aware.pick])
-    )
-    shares = replace(
-        aware.survival, plain_pick_interval=plain, pick_interval=pick, open_errors=open_errors(study.surfaces)
-    )
+    draws, found = draws_of(study, confirmed), aware.survival
+    picks = (study.coded(pareto.points[pareto.pick]), found.plain_pick), (aware.points[aware.pick], found.pick)
+    plain, pick = (survival(study, draws, point, aware.box).containing(share) for point, share in picks)
+    shares = replace(found, plain_pick_interval=plain, pick_interval=pick, open_errors=open_errors(study.surfaces))
     return replace(pareto, tolerance_aware=replace(aware, survival=shares))
 
 

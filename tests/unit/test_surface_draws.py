@@ -130,6 +130,8 @@ def test_closed_form_of_intervals_of_shares():
     assert none.low == 0.0 and none.high == pytest.approx(1.0 - every.low)
     assert [percent(each) for each in (0.9504, 0.9999, 1.0, 0.0001)] == ["95.0", "above 99.9", "100.0", "below 0.1"]
     assert every.words.endswith("to 100.0 %")
+    assert wide.containing(0.5) == wide == wide.containing(None)
+    assert none.containing(0.5) == (0.0, 0.5) and every.containing(0.5) == (0.5, 1.0)
 
 
 def test_closed_form_of_the_interval_of_one_linear_limit():
