@@ -302,6 +302,13 @@ class StartResult(Record, kw_only=True):
         sentence = f"start: over its inputs the radial clearance can fall to {low:.0f} µm; widen it or warm up slowly"
         return (Note("clearance", sentence),) if low < 0.0 else ()
 
+    def seizure_notes(self, part: str) -> Notes:
+        """A note where a ``part`` of a machine with a steady state seizes over the inputs."""
+        if self.status != "steady" or self.share_of_seizure == 0.0:
+            return ()
+        share = f"{100.0 * self.share_of_seizure:.0f} % of the input sets ({', '.join(self.inputs)})"
+        return (Note("undecided", f"start: {part} seizes in {share}"),)
+
     @property
     def figures(self) -> dict[str, Quantity]:
         """Figures that a study or a sweep may name, by ``START_FIGURES`` and ``BALL_START_FIGURES``."""

@@ -10,6 +10,7 @@ shaft, are those of as many courses.
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -47,33 +48,13 @@ from rbdyn.result import (
     StartMoment,
     StartResult,
 )
-from rbdyn.scene import Scene
-from rbdyn.scene.input_ranges import QUANTILES, SETS, STARTING, input_sets, varied_inputs
+from rbdyn.scene import Scene, input_ranges
 from rbdyn.scene.start import point_before
 from rbdyn.scene.thermal import Temperatures, at_temperatures, ceilings
+from rbdyn.thermal import start as warming
 from rbdyn.thermal.fixed_point import State
 from rbdyn.thermal.losses import HOTTEST
 from rbdyn.thermal.network import INNER, NODES, OIL, OUTER, ROLLERS
-from rbdyn.thermal.start import (
-    HOUSING,
-    MOVING,
-    SETTLED,
-    SHAFT,
-    STEADY,
-    WARMING_NODES,
-    Course,
-    Law,
-    Moment,
-    Warming,
-    columns,
-    law_of,
-    leasts_of,
-    settled_times,
-    slowest,
-    warming,
-    warming_conductances,
-    warming_network,
-)
 
 # Short simulations at most, and failures of them: next to a seizure they take long and fail.
 MOST_SIMULATIONS, MOST_FAILURES = 10, 2
@@ -166,16 +147,15 @@ def _parts_before(balance: Balance) -> tuple[list[float] | None, list[Balance]]:
 def _machine(scene: Scene, state: State, before: Sequence[float] | None) -> Machine:
     thermal, hot = scene.thermal, state.run.hot
     assert thermal is not None and thermal.start is not None
-    start = thermal.ambient_C if thermal.start.from_C is None else thermal.start.from_C
-    cold = np.array(before or thermal.start.from_parts_C or [start] * len(WARMING_NODES), dtype=np.float64)
+    cold = np.array(before or thermal.start.temperatures(thermal.ambient_C), dtype=np.float64)
     course = thermal.start.course(turning_speed(scene), scene.operation.radial_load_N)
     parts, boundaries = capacities(hot, thermal), state.model.boundaries
-    whole, _ = warming_network(warming_conductances(state.model.conductances, seats_of(hot)), boundaries)
-    end = float(course.times[-1]) + SETTLED * slowest(parts, whole)
+    whole, _ = warming.Surroundings(state.model.conductances, seats_of(hot), boundaries).network()
+    end = float(course.times[-1]) + warming.SETTLED * warming.slowest(parts, whole)
     return Machine(scene, hot, thermal, parts, course, cold, state, boundaries, end)
 
 
-def _first_time(course: Course) -> float:
+def _first_time(course: warming.Course) -> float:
     """First time at which the machine is fast enough for a simulation [s]."""
     fast = np.flatnonzero(course.speeds >= SLOW * course.speeds.max())[0]
     if fast == 0:
@@ -196,7 +176,7 @@ def _moment(machine: Machine, balance: Balance, runs: list[Balance], time: float
     speed, load = (float(value) for value in machine.course.at(time))
     at = Balance(at_point(machine.scene, speed, load), balance.simulate)
     runs.append(at)
-    state = at.at(nodes[: len(NODES)], seats=(float(nodes[HOUSING]), float(nodes[SHAFT])))
+    state = at.at(nodes[: len(NODES)], seats=(float(nodes[warming.HOUSING]), float(nodes[warming.SHAFT])))
     return _simulated(machine, state, time, nodes, speed, load)
 
 
@@ -204,48 +184,37 @@ def _simulated(
     machine: Machine, state: State, time: float | None, nodes: Array, speed: float, load: float
 ) -> Simulated:
     trial = state.run
-    conductances, seats = trial.network.conductances, seats_of(trial.hot)
+    around = warming.Surroundings(trial.network.conductances, seats_of(trial.hot), machine.boundaries)
     loss = quantity(POWER_LOSS, trial.ensemble.runs, [], 0.0, 0.0)
-    network = warming_network(warming_conductances(conductances, seats), machine.boundaries)
     logarithms = machine.course.logarithms_of(speed, load)
-    moment = Moment(nodes, logarithms, state.model.losses.powers, network)
-    return Simulated(moment, time, speed, load, conductances, seats, (loss.statistical_error or 0.0) / loss.value)
+    moment = warming.Moment(nodes, logarithms, state.model.losses.powers, around.network())
+    return Simulated(moment, time, speed, load, around, (loss.statistical_error or 0.0) / loss.value)
 
 
-def _law(machine: Machine, simulated: Sequence[Simulated]) -> Law:
-    """The law through all moments. A film's force follows viscosity times speed, so that its power begins with one more exponent."""
-    model = machine.state.model
-    viscous = model.losses.exponents
-    priors = np.column_stack((viscous, 1.0 + viscous, np.zeros_like(viscous)))
-    films = _padded(model.losses.films)
-    moments = [each.moment for each in simulated]
-    return law_of(moments, films, _padded(model.shares), model.losses.log_viscosity, priors, _reach(machine, films))
+def _law(machine: Machine, simulated: Sequence[Simulated]) -> warming.Law:
+    """The law through all moments."""
+    return warming.law_of([each.moment for each in simulated], machine.state.model, _reach(machine))
 
 
-def _padded(of_nodes: Array) -> Array:
-    """Columns of ``NODES`` as those of ``WARMING_NODES``."""
-    none = np.zeros((*of_nodes.shape[:-1], len(WARMING_NODES) - len(NODES)))
-    return np.concatenate((of_nodes, none), axis=-1)
-
-
-def _reach(machine: Machine, films: Array) -> tuple[Array, Array]:
+def _reach(machine: Machine) -> tuple[Array, Array]:
     """Changes of films and clearances by a kelvin of each node over how far a moment reaches, and the reach of speed and load."""
     middle = np.append(machine.state.temperatures, machine.state.temperatures[[OUTER, INNER]])
     nodes = np.vstack((machine.cold, middle, middle + np.eye(len(middle))))
     plays, _ = clearances_at(machine.hot, machine.thermal, nodes)
     slopes = [(play[2:] - play[1]) / max(CLEARANCE_REACH * abs(play[0]), LEAST_REACH) for play in plays.values()]
+    films = warming.padded(machine.state.model.losses.films)
     rows = films[np.abs(films).sum(axis=1) > 0.0]
     return np.vstack((np.unique(rows, axis=0) / FILM_REACH, slopes)), np.full(2, POINT_REACH)
 
 
-def _course_of(machine: Machine, law: Law, capacities: Array, tolerance: float) -> Warming:
+def _course_of(machine: Machine, law: warming.Law, capacities: Array, tolerance: float) -> warming.Warming:
     """Temperatures from the cold machine until the slowest node is steady, of many machines where the law has more axes."""
     start = np.broadcast_to(machine.cold, np.shape(capacities))
     breaks = machine.course.times.tolist()
-    return warming(capacities, law.net_heat(machine.course), start, machine.end, breaks, tolerance)
+    return warming.integrate(capacities, law.net_heat(machine.course), start, machine.end, breaks, tolerance)
 
 
-def _path(machine: Machine, law: Law) -> Path:
+def _path(machine: Machine, law: warming.Law) -> Path:
     """The course up to a temperature that no oil bears, or to a clearance that is lost."""
     rows = _course_of(machine, law, machine.capacities, 1e-2 * ROUGH).until_hot()
     figures, left = machine.clearances(rows)
@@ -255,13 +224,13 @@ def _path(machine: Machine, law: Law) -> Path:
     return Path(rows.until(end), _with_lead(rows, figures, end), seizing)
 
 
-def _with_lead(rows: Warming, figures: Mapping[str, Array], end: int) -> dict[str, Array]:
+def _with_lead(rows: warming.Warming, figures: Mapping[str, Array], end: int) -> dict[str, Array]:
     """Clearances and the lead of the inner ring in the first rows."""
     lead = rows.temperatures[..., INNER] - rows.temperatures[..., OUTER]
     return {name: column[:end] for name, column in {**figures, DIFFERENCE: lead}.items()}
 
 
-def _farthest(machine: Machine, law: Law, path: Path, failures: Sequence[Failure]) -> tuple[int, float]:
+def _farthest(machine: Machine, law: warming.Law, path: Path, failures: Sequence[Failure]) -> tuple[int, float]:
     """The row to simulate next, among those fast enough for it, and how far the farthest row is from its nearest moment.
 
     It is the farthest one of the first rows out of reach, up to twice the reach: what follows rests on extrapolation. Rows in reach of a simulation that failed do not count.
@@ -284,7 +253,7 @@ def _farthest(machine: Machine, law: Law, path: Path, failures: Sequence[Failure
 
 
 def _result(
-    machine: Machine, law: Law, path: Path, simulated: Sequence[Simulated], distance: float
+    machine: Machine, law: warming.Law, path: Path, simulated: Sequence[Simulated], distance: float
 ) -> tuple[StartResult, Notes]:
     status, reason = _verdict(machine, law, path)
     if seizures := _seizures(machine, law, path, simulated):
@@ -321,7 +290,7 @@ def _result(
         inputs=ranges.inputs,
         share_of_seizure=ranges.seizing,
         share_with_minimum=ranges.minima,
-        capacities_J_K=dict(zip(WARMING_NODES, machine.capacities.tolist(), strict=True)),
+        capacities_J_K=dict(zip(warming.WARMING_NODES, machine.capacities.tolist(), strict=True)),
         boundaries_C=machine.boundaries._asdict(),
         moments=tuple(_record(each) for each in simulated),
         path=_columns(machine, law, path, simulated, ranges.bands),
@@ -329,24 +298,24 @@ def _result(
     return start, _notes(machine, start, distance)
 
 
-def _figures(machine: Machine, rows: Warming, columns: Mapping[str, Array]) -> dict[str, Array]:
+def _figures(machine: Machine, rows: warming.Warming, columns: Mapping[str, Array]) -> dict[str, Array]:
     """Figures of each machine: least clearances with their times and whether they are minima, largest lead, time to steady.
 
     A clearance without a minimum is least at the start, or when the machine is steady.
     """
-    settled = settled_times(rows.times, rows.temperatures, STEADY)
+    settled = warming.settled_times(rows.times, rows.temperatures, warming.STEADY)
     found = {SETTLING: np.maximum(settled, machine.course.times[-1])}
     for name, column in columns.items():
         if name == DIFFERENCE:
-            found[name] = -leasts_of(rows.times, -column)[0]
+            found[name] = -warming.leasts_of(rows.times, -column)[0]
             continue
-        found[name], time, inside = leasts_of(rows.times, column)
+        found[name], time, inside = warming.leasts_of(rows.times, column)
         found[f"{name}_inside"] = inside
         found[f"{name}_time_s"] = np.where(inside, time, np.where(column[0] <= column[-1], 0.0, found[SETTLING]))
     return found
 
 
-def _verdict(machine: Machine, law: Law, path: Path) -> tuple[str, str]:
+def _verdict(machine: Machine, law: warming.Law, path: Path) -> tuple[str, str]:
     """Status of a start, and why it is not steady."""
     times, nodes = path.rows.times, path.rows.temperatures
     at = f"after {times[-1]:.3g} s"
@@ -359,7 +328,7 @@ def _verdict(machine: Machine, law: Law, path: Path) -> tuple[str, str]:
     operation = machine.scene.operation
     ends_there = tuple(machine.course.at(times[-1])) == (turning_speed(machine.scene), operation.radial_load_N)
     gap = float(np.abs(nodes[-1, : len(NODES)] - machine.state.temperatures).max())
-    if ends_there and gap > STEADY:
+    if ends_there and gap > warming.STEADY:
         return (
             "undecided",
             f"it ends {gap:.0f} K from the steady state, since {MOST_SIMULATIONS} short simulations are too few",
@@ -369,7 +338,7 @@ def _verdict(machine: Machine, law: Law, path: Path) -> tuple[str, str]:
         if (over := np.flatnonzero(parts[part] > ceiling)).size:
             return "too hot", f"after {times[over[0]]:.3g} s the {part} passes its ceiling of {ceiling:g} C"
     rest = law.net_heat(machine.course)(float(times[-1]), nodes[-1]) / machine.capacities
-    if np.abs(rest).max() * slowest(machine.capacities, law.matrices[0]) > MOVING:
+    if np.abs(rest).max() * warming.slowest(machine.capacities, law.matrices[0]) > warming.MOVING:
         return "undecided", f"{at} the temperatures still move"
     return "steady", ""
 
@@ -387,7 +356,7 @@ def _halves(simulated: Sequence[Simulated]) -> list[list[Simulated]]:
     return [[*ends, *between[place::2]] for place in (0, 1)] if between else [[*ends[:1]]]
 
 
-def _seizures(machine: Machine, law: Law, path: Path, simulated: Sequence[Simulated]) -> list[float]:
+def _seizures(machine: Machine, law: warming.Law, path: Path, simulated: Sequence[Simulated]) -> list[float]:
     """Moments [s] at which a part seizes by all moments and by each half of them; none unless all agree that it does."""
     if len(simulated) < SURE or _verdict(machine, law, path)[0] != "seizure":
         return []
@@ -397,7 +366,7 @@ def _seizures(machine: Machine, law: Law, path: Path, simulated: Sequence[Simula
     return sorted(float(each.rows.times[-1]) for _, each in paths) if agreed else []
 
 
-def _errors(machine: Machine, law: Law, path: Path, simulated: Sequence[Simulated]) -> dict[str, Errors]:
+def _errors(machine: Machine, law: warming.Law, path: Path, simulated: Sequence[Simulated]) -> dict[str, Errors]:
     """Errors of each figure.
 
     Statistical: root sum of squares of what the scatter of each moment's power moves. Interpolation: the larger change by leaving
@@ -407,7 +376,7 @@ def _errors(machine: Machine, law: Law, path: Path, simulated: Sequence[Simulate
     """
     scatter = np.diag([each.scatter for each in simulated])
     powers = law.powers * (1.0 + scatter[:, :, np.newaxis])
-    many = np.broadcast_to(machine.capacities, (len(simulated), len(WARMING_NODES)))
+    many = np.broadcast_to(machine.capacities, (len(simulated), len(warming.WARMING_NODES)))
     (base, columns), (moved, _) = (
         _rough(machine, *changed) for changed in ((law, machine.capacities), (law._replace(powers=powers), many))
     )
@@ -429,67 +398,38 @@ def _errors(machine: Machine, law: Law, path: Path, simulated: Sequence[Simulate
 
 def _share_error(share: float) -> float:
     """Half-width of the 95 % interval of a share of ``SETS`` (Agresti and Coull)."""
-    count = SETS + 4.0
-    middle = (share * SETS + 2.0) / count
+    count = input_ranges.SETS + 4.0
+    middle = (share * input_ranges.SETS + 2.0) / count
     return NORMAL * math.sqrt(middle * (1.0 - middle) / count)
 
 
-def _rough(machine: Machine, law: Law, capacities: Array) -> tuple[dict[str, Array], dict[str, Array]]:
+def _rough(machine: Machine, law: warming.Law, capacities: Array) -> tuple[dict[str, Array], dict[str, Array]]:
     """Figures of each machine that does not end early, and its columns over time."""
     rows = _course_of(machine, law, capacities, ROUGH)
     columns = _with_lead(rows, machine.clearances(rows)[0], len(rows.times))
     return _figures(machine, rows, columns), columns
 
 
-class InputRanges(NamedTuple):
-    """Ranges of figures, bands of columns over time (two rows each), the inputs, and shares of the sets.
-
-    ``seizing``: share in which a part seizes; ``minima``: those in which each clearance has a minimum.
-    """
-
-    figures: dict[str, tuple[float, ...]]
-    bands: dict[str, Array]
-    inputs: tuple[str, ...]
-    seizing: float
-    minima: dict[str, float]
-
-
-def _ranges(machine: Machine, law: Law, path: Path, simulated: Sequence[Simulated]) -> InputRanges:
+def _ranges(machine: Machine, law: warming.Law, path: Path, simulated: Sequence[Simulated]) -> input_ranges.StartRanges:
     """Ranges over the inputs of the balance and the masses of housing and shaft."""
     scene, hot = machine.scene, machine.hot
     levels = loss_levels(hot, machine.state.run.bearing)
-    sets = input_sets(scene, levels, [] if scene.uncertain is None else scene.uncertain.estimated, STARTING)
-    varied = list(varied_inputs(machine.thermal, sets, levels))
-    dry, wet = (_padded(term_shares(hot, share)) for share in (0.0, 1.0))
-    networks = [[_varied_network(machine, each, ratios) for each in simulated] for _, ratios, _ in varied]
-    many = law._replace(
-        powers=law.powers * np.array([level for *_, level in varied])[:, np.newaxis, :],
-        shares=np.array([dry + thermal.film_share_to_oil * (wet - dry) for thermal, *_ in varied]),
-        matrices=np.array([[whole for whole, _ in row] for row in networks]),
-        sources=np.array([[inflow for _, inflow in row] for row in networks]),
+    sets = input_ranges.input_sets(
+        scene, levels, [] if scene.uncertain is None else scene.uncertain.estimated, input_ranges.STARTING
     )
+    varied = list(input_ranges.varied_inputs(machine.thermal, sets, levels))
+    many = input_ranges.law_of_sets(law, [each.around for each in simulated], varied, partial(term_shares, hot))
     rows = _course_of(machine, many, np.array([capacities(hot, thermal) for thermal, *_ in varied]), ROUGH)
     keys = {name: np.array([getattr(each, name) for each, *_ in varied]) for name in ("shaft_lag", "cage_offset_K")}
     plays, left = machine.clearances(rows, machine.thermal.model_copy(update=keys))
     figures = _with_lead(rows, plays, len(rows.times))
-    nodes = dict(zip(WARMING_NODES, np.moveaxis(rows.temperatures, -1, 0), strict=True))
-    bands = {
-        name: np.quantile(column, [QUANTILES[0], QUANTILES[-1]], axis=1)[:, : len(path.rows.times)]
-        for name, column in {**nodes, **figures}.items()
-    }
     seizing = np.any([(play <= 0.0).any(axis=0) for play in left.values()], axis=0)
     seizing = seizing | (rows.temperatures.max(axis=(0, 2)) > HOTTEST)
     found = _figures(machine, rows, figures)
     minima = {name: float(np.mean(found.pop(f"{name}_inside"))) for name in plays}
-    ranges = {name: tuple(np.quantile(column, QUANTILES).tolist()) for name, column in found.items()}
-    return InputRanges(ranges, bands, tuple(sets), float(np.mean(seizing)), minima)
-
-
-def _varied_network(machine: Machine, each: Simulated, ratios: Mapping[str, float]) -> tuple[Array, Array]:
-    """Network of a moment with conductances times ratios."""
-    scaled = {name: ratio * getattr(each.conductances, name) for name, ratio in ratios.items()}
-    conductances = warming_conductances(each.conductances._replace(**scaled), each.seats)
-    return warming_network(conductances, machine.boundaries)
+    ranges = {name: tuple(np.quantile(column, input_ranges.QUANTILES).tolist()) for name, column in found.items()}
+    bands = input_ranges.bands_of(rows, figures, len(path.rows.times))
+    return input_ranges.StartRanges(ranges, bands, tuple(sets), float(np.mean(seizing)), minima)
 
 
 def _race_pressure(machine: Machine, path: Path) -> tuple[float, float]:
@@ -503,7 +443,7 @@ def _race_pressure(machine: Machine, path: Path) -> tuple[float, float]:
     point = at_point(machine.scene, max(speed, SLOW * machine.course.speeds.max()), load)
     found = list[tuple[float, float]]()
     for warmer in (0.0, 1.0):
-        nodes = path.rows.temperatures[row] + warmer * np.eye(len(WARMING_NODES))[INNER]
+        nodes = path.rows.temperatures[row] + warmer * np.eye(len(warming.WARMING_NODES))[INNER]
         try:
             hot = at_temperatures(
                 point, Temperatures(*nodes[: len(NODES)].tolist()), tuple(nodes[len(NODES) :].tolist())
@@ -524,20 +464,19 @@ def _race_pressure(machine: Machine, path: Path) -> tuple[float, float]:
 
 
 def _record(each: Simulated) -> StartMoment:
-    nodes = dict(zip(WARMING_NODES, each.moment.temperatures.tolist(), strict=True))
+    nodes = dict(zip(warming.WARMING_NODES, each.moment.temperatures.tolist(), strict=True))
     return StartMoment(each.time, each.speed / RPM, each.load, nodes, float(each.moment.powers.sum()))
 
 
 def _columns(
-    machine: Machine, law: Law, path: Path, simulated: Sequence[Simulated], bands: Mapping[str, Array]
+    machine: Machine, law: warming.Law, path: Path, simulated: Sequence[Simulated], bands: Mapping[str, Array]
 ) -> dict[str, Any]:
     times, nodes = path.rows.times, path.rows.temperatures
     speeds, _ = machine.course.at(times)
     logarithms = machine.course.logarithms(times)
     heat = law.heat(nodes, logarithms, (speeds > 0.0).astype(float))
-    of_moments = [warming_conductances(each.conductances, each.seats) for each in simulated]
-    conductances = law.weights(nodes, logarithms) @ np.array(of_moments)
-    return columns(machine.course, path.rows, heat, conductances, path.figures, bands)
+    conductances = law.weights(nodes, logarithms) @ np.array([each.around.warming for each in simulated])
+    return warming.columns(machine.course, path.rows, heat, conductances, path.figures, bands)
 
 
 def _failure_notes(failures: Sequence[Failure]) -> Notes:
@@ -553,9 +492,7 @@ def _failure_notes(failures: Sequence[Failure]) -> Notes:
 def _notes(machine: Machine, start: StartResult, distance: float) -> Notes:
     notes = list(status_notes(f"{start.status}: start: {start.reason}" if start.reason else start.status))
     notes += start.lost_clearance if machine.scene.bearing.radial_clearance > 0.0 else ()
-    if start.status == "steady" and start.share_of_seizure > 0.0:
-        share = f"{100.0 * start.share_of_seizure:.0f} % of the input sets ({', '.join(start.inputs)})"
-        notes.append(Note("undecided", f"start: a part seizes in {share}"))
+    notes += start.seizure_notes("a part")
     if distance > FAR:
         sentence = (
             f"start: after {MOST_SIMULATIONS} short simulations some moments are {distance:.2g} times as far apart as intended; the errors "

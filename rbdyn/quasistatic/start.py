@@ -9,53 +9,30 @@ import math
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from rbdyn.base.arrays import Array
 from rbdyn.base.faults import InputError
-from rbdyn.base.notes import Note, Notes, status_notes
+from rbdyn.base.notes import Notes, status_notes
 from rbdyn.clearances import DIFFERENCE
 from rbdyn.life.friction import NO_AXIAL_LOAD
 from rbdyn.quasistatic.result import BallResult, Rating, pressures, reference_capacities
 from rbdyn.quasistatic.row.model import clearance_of
 from rbdyn.quasistatic.temperatures import Heat, heat_at, starvation_note, static_capacity_of, term_shares
 from rbdyn.result import GreatestValue, LeastClearance, Quantity, StartResult
+from rbdyn.scene import input_ranges
 from rbdyn.scene.ball import SingleRowScene
 from rbdyn.scene.fits import mounted_of, row_change
-from rbdyn.scene.input_ranges import QUANTILES, STARTING, course_ranges, input_sets, varied_inputs
 from rbdyn.scene.operation import raceway_radii
 from rbdyn.scene.thermal import Temperatures, Thermal, oil_ceiling, part_temperatures
+from rbdyn.thermal import start as warming
 from rbdyn.thermal.conductances import cavity_volume
 from rbdyn.thermal.fixed_point import Search
 from rbdyn.thermal.losses import HOTTEST
 from rbdyn.thermal.network import INNER, NODES, OIL, OUTER
-from rbdyn.thermal.start import (
-    HOUSING,
-    MOVING,
-    SETTLED,
-    SHAFT,
-    SLOWEST,
-    STEADY,
-    TOLERANCE,
-    WARMING_NODES,
-    Course,
-    Law,
-    Moment,
-    Seats,
-    Warming,
-    capacities_of,
-    columns,
-    law_of,
-    least_of,
-    seats_between,
-    settling_time,
-    slowest,
-    warming,
-    warming_conductances,
-    warming_network,
-)
 
 # Figures whose largest value counts.
 AXIAL = "axial_load_N"
@@ -72,17 +49,17 @@ STEP = 0.01
 
 
 class Here(NamedTuple):
-    """A machine at a moment: its heat, seats, network, and figures by name."""
+    """A machine at a moment: its heat, what is ``around`` it, network, and figures by name."""
 
     heat: Heat
-    seats: Seats
+    around: warming.Surroundings
     network: tuple[Array, Array]
     figures: dict[str, float]
 
     def net(self, nodes: Array) -> Array:
         """Heat of the nodes less what the network carries off (6,) [W], that of a machine at rest too."""
         whole, inflow = self.network
-        return _padded(self.heat.heat) + inflow - whole @ nodes
+        return warming.padded(self.heat.heat) + inflow - whole @ nodes
 
 
 class Machine(NamedTuple):
@@ -92,7 +69,7 @@ class Machine(NamedTuple):
     scene: SingleRowScene
     thermal: Thermal
     capacities: Array
-    course: Course
+    course: warming.Course
     cold: Array
     search: Search
     end: float
@@ -100,12 +77,10 @@ class Machine(NamedTuple):
     def at(self, time: float, nodes: Array) -> Here:
         """The machine at a time and temperatures (6,). Raises InputError where it has no equilibrium or is overloaded."""
         speed, load = (float(value) for value in self.course.at(time))
-        least = SLOWEST * float(self.course.speeds.max())
+        least = warming.SLOWEST * float(self.course.speeds.max())
         found = heat_at(at_point(self.scene, max(speed, least), load), nodes[: len(NODES)], _seat_nodes(nodes))
         if speed == 0.0:
             found = found._replace(powers=np.zeros_like(found.powers))
-        seats = _seats(found.scene)
-        network = warming_network(warming_conductances(found.conductances, seats), found.boundaries)
         rating = Rating(self.scene.bearing, found.model, reference_capacities(self.scene.bearing), (0.0, 0.0))
         axial, small = found.loads.axial, NO_AXIAL_LOAD * static_capacity_of(found.scene, found.model)
         figures = {
@@ -114,11 +89,12 @@ class Machine(NamedTuple):
             AXIAL: float(f"{axial:.9g}") if axial > small else 0.0,
             "contact_pressure_MPa": 1e-6 * max(pressures(found.solution, rating).values()),
         }
-        return Here(found, seats, network, figures)
+        around = _surroundings(found)
+        return Here(found, around, around.network(), figures)
 
-    def warmed(self, tolerance: float) -> Warming:
+    def warmed(self, tolerance: float) -> warming.Warming:
         """Temperatures until the slowest node is steady, or one passes what any oil bears."""
-        last = np.zeros(len(WARMING_NODES))
+        last = np.zeros(len(warming.WARMING_NODES))
 
         def net(time: float, nodes: Array) -> Array:
             # Beyond an impossible bearing the heat stays, so that the integration ends; rows from there on are cut.
@@ -129,22 +105,24 @@ class Machine(NamedTuple):
                 last = self.at(time, nodes).net(nodes)
             return last
 
-        return warming(self.capacities, net, self.cold, self.end, self.course.times.tolist(), tolerance).until_hot()
+        return warming.integrate(
+            self.capacities, net, self.cold, self.end, self.course.times.tolist(), tolerance
+        ).until_hot()
 
 
 class Path(NamedTuple):
     """The course of a machine with its state and figures in each row, until it is impossible by the ``fault``, if it is."""
 
-    rows: Warming
+    rows: warming.Warming
     here: list[Here]
     figures: dict[str, Array]
     fault: str
 
     def extreme(self, name: str, step: int = 1) -> tuple[float, float, bool]:
-        """As ``least_of``, or the largest of ``GREATEST``; of each ``step``-th row."""
+        """As ``leasts_of``, or the largest of ``GREATEST``; of each ``step``-th row."""
         sign = -1.0 if name in GREATEST else 1.0
-        value, time, inside = least_of(self.rows.times[::step], sign * self.figures[name][::step])
-        return sign * value, time, inside
+        value, time, inside = warming.leasts_of(self.rows.times[::step], sign * self.figures[name][::step])
+        return sign * float(value), float(time), bool(inside)
 
 
 def with_start(scene: SingleRowScene, search: Search, result: BallResult, ranged: bool) -> BallResult:
@@ -181,19 +159,14 @@ def at_point(scene: SingleRowScene, speed: float, load: float) -> SingleRowScene
 
 
 def _seat_nodes(nodes: Array) -> tuple[float, float]:
-    return float(nodes[HOUSING]), float(nodes[SHAFT])
+    return float(nodes[warming.HOUSING]), float(nodes[warming.SHAFT])
 
 
-def _seats(hot: SingleRowScene) -> Seats:
-    rings, lubricant, mounting = mounted_of(hot), hot.lubricant, hot.mounting
+def _surroundings(heat: Heat) -> warming.Surroundings:
+    rings, lubricant, mounting = mounted_of(heat.scene), heat.scene.lubricant, heat.scene.mounting
     assert rings is not None and lubricant is not None and mounting is not None and mounting.width is not None
-    return seats_between(rings, mounting.width, lubricant.in_service.conductivity)
-
-
-def _padded(of_nodes: Array) -> Array:
-    """Columns of ``NODES`` as those of ``WARMING_NODES``."""
-    none = np.zeros((*of_nodes.shape[:-1], len(WARMING_NODES) - len(NODES)))
-    return np.concatenate((of_nodes, none), axis=-1)
+    seats = warming.seats_between(rings, mounting.width, lubricant.in_service.conductivity)
+    return warming.Surroundings(heat.conductances, seats, heat.boundaries)
 
 
 def capacities(hot: SingleRowScene, widths: tuple[float, float]) -> Array:
@@ -205,37 +178,35 @@ def capacities(hot: SingleRowScene, widths: tuple[float, float]) -> Array:
     cavity = cavity_volume((outer, inner), mounting.width, row.balls, volume, 0.0)
     fill = 1.0 if lubricant.supply == "bath" else lubricant.oil_fraction
     balls = row.balls * volume * ball.density * ball.heat_capacity
-    return capacities_of(rings, mounting.width, widths, fill * cavity * oil.density * oil.heat_capacity, balls)
+    return warming.capacities_of(rings, mounting.width, widths, fill * cavity * oil.density * oil.heat_capacity, balls)
 
 
 def _machine(scene: SingleRowScene, search: Search) -> Machine:
     thermal, found = scene.thermal, search.last.run
     assert thermal is not None and thermal.start is not None
-    start = thermal.ambient_C if thermal.start.from_C is None else thermal.start.from_C
-    cold = np.array(thermal.start.from_parts_C or [start] * len(WARMING_NODES), dtype=np.float64)
+    cold = np.array(thermal.start.temperatures(thermal.ambient_C), dtype=np.float64)
     course = thermal.start.course(turning_speed(scene), math.hypot(*scene.operation.load[:2]))
     parts = capacities(found.scene, thermal.start.widths)
-    whole, _ = warming_network(warming_conductances(found.conductances, _seats(found.scene)), found.boundaries)
-    end = float(course.times[-1]) + SETTLED * slowest(parts, whole)
+    whole, _ = _surroundings(found).network()
+    end = float(course.times[-1]) + warming.SETTLED * warming.slowest(parts, whole)
     return Machine(scene, thermal, parts, course, cold, search, end)
 
 
 def _start(scene: SingleRowScene, search: Search, ranged: bool) -> tuple[StartResult, Notes]:
     """The start with its notes. Raises InputError where the cold bearing is impossible."""
     machine = _machine(scene, search)
-    path = _path(machine, TOLERANCE)
+    path = _path(machine, warming.TOLERANCE)
     status, reason = _verdict(machine, path)
     found = {name: path.extreme(name) for name in path.figures}
     errors = _errors(machine, path)
     quantities = {name: Quantity(found[name][0], 0.0, errors[name], float(len(path.here)), None) for name in found}
     times = {name: time if inside else None for name, (_, time, inside) in found.items()}
-    ranges = _ranges(machine, path) if ranged else InputRanges({}, {}, (), 0.0)
-    settled = None
-    if status in ("steady", "too hot"):
-        table = path.rows.temperatures
-        settled = settling_time(path.rows.times, table, table[-1], STEADY)
-    conductances = np.array([warming_conductances(here.heat.conductances, here.seats) for here in path.here])
-    heat = np.array([_padded(here.heat.heat) for here in path.here])
+    ranges = _ranges(machine, path) if ranged else input_ranges.StartRanges({}, {}, (), 0.0)
+    settled = max(
+        warming.settled_times(path.rows.times, path.rows.temperatures, warming.STEADY), machine.course.times[-1]
+    )
+    conductances = np.array([here.around.warming for here in path.here])
+    heat = np.array([warming.padded(here.heat.heat) for here in path.here])
     start = StartResult(
         status=status,
         reason=reason or None,
@@ -243,15 +214,15 @@ def _start(scene: SingleRowScene, search: Search, ranged: bool) -> tuple[StartRe
         temperature_difference_K=quantities[DIFFERENCE],
         axial_load_N=GreatestValue(quantities[AXIAL], times[AXIAL]) if AXIAL in quantities else None,
         contact_pressure_MPa=GreatestValue(quantities["contact_pressure_MPa"], times["contact_pressure_MPa"]),
-        time_to_steady_s=None if settled is None else max(settled, float(machine.course.times[-1])),
+        time_to_steady_s=float(settled) if status in ("steady", "too hot") else None,
         race_pressure_MPa=None,
         ranges=ranges.figures,
         inputs=ranges.inputs,
         share_of_seizure=ranges.seizing,
-        capacities_J_K=dict(zip(WARMING_NODES, machine.capacities.tolist(), strict=True)),
+        capacities_J_K=dict(zip(warming.WARMING_NODES, machine.capacities.tolist(), strict=True)),
         boundaries_C=search.last.run.boundaries._asdict(),
         moments=(),
-        path=columns(machine.course, path.rows, heat, conductances, path.figures, ranges.bands),
+        path=warming.columns(machine.course, path.rows, heat, conductances, path.figures, ranges.bands),
     )
     return start, _notes(path, start)
 
@@ -317,11 +288,11 @@ def _verdict(machine: Machine, path: Path) -> tuple[str, str]:
     ceiling, over = oil_ceiling(thermal, lubricant), np.flatnonzero(nodes[:, OIL] > oil_ceiling(thermal, lubricant))
     if over.size:
         return "too hot", f"after {times[over[0]]:.3g} s the oil passes its ceiling of {ceiling:g} C"
-    if ends_there and machine.search.status == "steady" and gap > STEADY:
+    if ends_there and machine.search.status == "steady" and gap > warming.STEADY:
         return "undecided", f"it ends {gap:.0f} K from the steady state of the first guess, so the balance has several"
     last = path.here[-1]
     rest = last.net(nodes[-1]) / machine.capacities
-    if np.abs(rest).max() * slowest(machine.capacities, last.network[0]) > MOVING:
+    if np.abs(rest).max() * warming.slowest(machine.capacities, last.network[0]) > warming.MOVING:
         return "undecided", f"after {times[-1]:.3g} s the temperatures still move"
     return "steady", ""
 
@@ -336,20 +307,11 @@ def _errors(machine: Machine, path: Path) -> dict[str, float]:
     }
 
 
-class InputRanges(NamedTuple):
-    """Ranges of figures, bands of columns over time (two rows each), the inputs, and the share of the sets that seize."""
-
-    figures: dict[str, tuple[float, ...]]
-    bands: dict[str, Array]
-    inputs: tuple[str, ...]
-    seizing: float
-
-
 def radial_clearance(hot: SingleRowScene, thermal: Thermal, nodes: Array) -> Array:
     """Diametral clearance [um] at temperatures (..., 6) [C] and the speed of a scene at stated temperatures."""
     assert hot.mounting is not None
     at = Temperatures(*np.moveaxis(nodes[..., : len(NODES)], -1, 0))
-    keys = part_temperatures(thermal, at, cage=False, seats=(nodes[..., HOUSING], nodes[..., SHAFT]))
+    keys = part_temperatures(thermal, at, cage=False, seats=(nodes[..., warming.HOUSING], nodes[..., warming.SHAFT]))
     change = row_change(hot.model_copy(update={"mounting": hot.mounting.model_copy(update=keys)}))
     row, angle = hot.bearing, hot.bearing.contact_angle
     between = row.groove_centre_distance
@@ -384,7 +346,7 @@ class Moments(NamedTuple):
     """Moments of the power laws with their place among oil, clearance, speed and load, and places that are impossible."""
 
     here: list[Here]
-    moments: list[Moment]
+    moments: list[warming.Moment]
     places: list[Array]
     impossible: list[Array]
 
@@ -396,68 +358,43 @@ class Moments(NamedTuple):
             self.impossible.append(place)
             return
         self.here.append(here)
-        self.moments.append(Moment(nodes, machine.course.logarithms(time), here.heat.powers, here.network))
+        self.moments.append(warming.Moment(nodes, machine.course.logarithms(time), here.heat.powers, here.network))
         self.places.append(place)
 
 
-def _ranges(machine: Machine, path: Path) -> InputRanges:
+def _ranges(machine: Machine, path: Path) -> input_ranges.StartRanges:
     """Ranges over the inputs of the balance and the masses of housing and shaft.
 
     The first moments are those of the course; the courses of the input sets add as many as they need.
     """
     scene, reach = machine.scene, _reach(machine)
-    sets = input_sets(scene, (), (), STARTING)
-    varied = list(varied_inputs(machine.thermal, sets, {}))
+    sets = input_ranges.input_sets(scene, (), (), input_ranges.STARTING)
+    varied = list(input_ranges.varied_inputs(machine.thermal, sets, {}))
     moments = Moments([], [], [], [])
     rows, of_sets = path.rows.temperatures[:, np.newaxis], path.rows
     for most in (MOST_MOMENTS // 2, MOST_MOMENTS):
-        flat = rows.reshape(-1, len(WARMING_NODES))
+        flat = rows.reshape(-1, len(warming.WARMING_NODES))
         times = np.repeat(of_sets.times, rows.shape[1])
         logarithms = machine.course.logarithms(times)
         places = np.hstack((np.minimum(flat, HOTTEST) @ reach[0].T, logarithms / reach[1]))
         taken = np.array([*moments.places, *moments.impossible]).reshape(-1, places.shape[1])
         for place in _cover(places, taken, most - len(taken)):
             moments.add(machine, float(times[place]), np.minimum(flat[place], HOTTEST), places[place])
-        law = _law(machine, moments, varied, reach)
+        law = warming.law_of(moments.moments, machine.search.last.model, reach)
+        law = input_ranges.law_of_sets(law, [here.around for here in moments.here], varied, partial(term_shares, scene))
         of_sets = _many(machine, law, varied)
         rows = of_sets.temperatures
     thermals = [thermal for thermal, *_ in varied]
     figures = _clearances_of_sets(machine, of_sets, thermals)
     largest, impossible = _loads_of_sets(machine, law, moments, of_sets, figures, thermals)
     seizing = impossible | (rows.max(axis=(0, 2)) > HOTTEST)
-    nodes = dict(zip(WARMING_NODES, np.moveaxis(rows, -1, 0), strict=True))
-    bands = {
-        name: np.quantile(column, [QUANTILES[0], QUANTILES[-1]], axis=1)[:, : len(path.rows.times)]
-        for name, column in {**nodes, **figures}.items()
-    }
-    found = course_ranges(of_sets, figures)
-    found |= {name: tuple(np.nanquantile(column, QUANTILES).tolist()) for name, column in largest.items()}
-    return InputRanges(found, bands, tuple(sets), float(np.mean(seizing)))
+    bands = input_ranges.bands_of(of_sets, figures, len(path.rows.times))
+    found = input_ranges.course_ranges(of_sets, figures)
+    found |= {name: tuple(np.nanquantile(column, input_ranges.QUANTILES).tolist()) for name, column in largest.items()}
+    return input_ranges.StartRanges(found, bands, tuple(sets), float(np.mean(seizing)))
 
 
-def _law(machine: Machine, moments: Moments, varied: Sequence[Any], reach: tuple[Array, Array]) -> Law:
-    """The law through the moments, with shares and networks of each input set."""
-    model = machine.search.last.model
-    viscous, films = model.losses.exponents, _padded(model.losses.films)
-    priors = np.column_stack((viscous, 1.0 + viscous, np.zeros_like(viscous)))
-    law = law_of(moments.moments, films, _padded(model.shares), model.losses.log_viscosity, priors, reach)
-    dry, wet = (_padded(term_shares(machine.scene, share)) for share in (0.0, 1.0))
-    networks = [[_varied_network(here, ratios) for here in moments.here] for _, ratios, _ in varied]
-    return law._replace(
-        shares=np.array([dry + thermal.film_share_to_oil * (wet - dry) for thermal, *_ in varied]),
-        matrices=np.array([[whole for whole, _ in row] for row in networks]),
-        sources=np.array([[inflow for _, inflow in row] for row in networks]),
-    )
-
-
-def _varied_network(here: Here, ratios: Mapping[str, float]) -> tuple[Array, Array]:
-    """Network of a moment with conductances times ratios."""
-    own = here.heat.conductances
-    scaled = own._replace(**{name: ratio * getattr(own, name) for name, ratio in ratios.items()})
-    return warming_network(warming_conductances(scaled, here.seats), here.heat.boundaries)
-
-
-def _many(machine: Machine, law: Law, varied: Sequence[Any]) -> Warming:
+def _many(machine: Machine, law: warming.Law, varied: Sequence[Any]) -> warming.Warming:
     """Courses of the input sets."""
     hot = machine.search.last.run.scene
     parts = np.array([capacities(hot, thermal.start.widths) for thermal, *_ in varied])
@@ -469,10 +406,10 @@ def _many(machine: Machine, law: Law, varied: Sequence[Any]) -> Warming:
         beyond = (nodes.max(axis=-1, keepdims=True) - HOTTEST) / HELD
         return net(time, nodes) * np.clip(1.0 - beyond, 0.0, 1.0)
 
-    return warming(parts, held, start, machine.end, breaks, ROUGHEST)
+    return warming.integrate(parts, held, start, machine.end, breaks, ROUGHEST)
 
 
-def _clearances_of_sets(machine: Machine, rows: Warming, thermals: Sequence[Thermal]) -> dict[str, Array]:
+def _clearances_of_sets(machine: Machine, rows: warming.Warming, thermals: Sequence[Thermal]) -> dict[str, Array]:
     """Clearances [um] and leads of the inner ring [K] (rows, sets)."""
     hot, speeds = machine.search.last.run.scene, machine.course.at(rows.times)[0]
     lag = machine.thermal.model_copy(update={"shaft_lag": np.array([thermal.shaft_lag for thermal in thermals])})
@@ -485,9 +422,9 @@ def _clearances_of_sets(machine: Machine, rows: Warming, thermals: Sequence[Ther
 
 def _loads_of_sets(
     machine: Machine,
-    law: Law,
+    law: warming.Law,
     moments: Moments,
-    rows: Warming,
+    rows: warming.Warming,
     figures: Mapping[str, Array],
     thermals: Sequence[Thermal],
 ) -> tuple[dict[str, Array], Array]:
@@ -515,9 +452,7 @@ def _loads_of_sets(
 
 def _notes(path: Path, start: StartResult) -> Notes:
     notes = list(status_notes(f"{start.status}: start: {start.reason}" if start.reason else start.status))
-    if start.status == "steady" and start.share_of_seizure > 0.0:
-        share = f"{100.0 * start.share_of_seizure:.0f} % of the input sets ({', '.join(start.inputs)})"
-        notes.append(Note("undecided", f"start: the bearing seizes in {share}"))
+    notes += start.seizure_notes("the bearing")
     if path.here[0].heat.scene.bearing.kind == "deep_groove_ball":
         notes += start.lost_clearance
     starved = starvation_note(path.here[0].heat.scene, f"start at {path.rows.temperatures[0, OIL]:.4g} C")

@@ -7,8 +7,8 @@ uncertainty``, which also varies all other inputs, by simulation.
 """
 
 import math
-from collections.abc import Callable, Collection, Iterator, Mapping
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from rbdyn.scene import Scene
     from rbdyn.scene.ball import SingleRowScene
     from rbdyn.scene.thermal import Thermal
-    from rbdyn.thermal.start import Warming
+    from rbdyn.thermal.start import Law, Surroundings, Warming
 
 # Keys of [thermal] that scale conductances, and the conductances that each scales; all keys that vary.
 SCALED = {
@@ -60,6 +60,8 @@ class Ranges(Record):
 
 # By key of a scene, the losses (terms,) at a value of it over those at its own.
 Levels = Mapping[str, Callable[[float], Array]]
+# Of a set of inputs: keys of [thermal], ratios of conductances by name, and losses (terms,) over the usual ones.
+Varied = tuple["Thermal", dict[str, float], Array]
 # Clearances in operation [um] by name, at temperatures of the nodes (4,) [C] and with keys of [thermal]. Raises ValueError.
 Clearances = Callable[[Array, "Thermal"], Mapping[str, float]]
 # Shares of the nodes in the losses (terms, 4) by the share of a film's heat that its oil takes.
@@ -130,10 +132,44 @@ def course_ranges(
     }
 
 
-def varied_inputs(
-    thermal: "Thermal", sets: Mapping[str, Array], levels: Levels
-) -> "Iterator[tuple[Thermal, dict[str, float], Array]]":
-    """For each set of inputs: keys of [thermal], ratios of conductances by name, and losses (terms,) over the usual ones."""
+class StartRanges(NamedTuple):
+    """Ranges of the figures of a start, bands of columns over time (two rows each), the inputs, and shares of the sets.
+
+    ``seizing``: share in which a part seizes; ``minima``: those in which each clearance has a minimum.
+    """
+
+    figures: dict[str, tuple[float, ...]]
+    bands: dict[str, Array]
+    inputs: tuple[str, ...]
+    seizing: float
+    minima: dict[str, float] = {}
+
+
+def bands_of(rows: "Warming", figures: Mapping[str, Array], count: int) -> dict[str, Array]:
+    """5 and 95 % of the temperatures of many machines, and of their ``figures`` (rows, machines), in the first rows."""
+    from rbdyn.thermal.start import WARMING_NODES
+
+    nodes = dict(zip(WARMING_NODES, np.moveaxis(rows.temperatures, -1, 0), strict=True))
+    ends = [QUANTILES[0], QUANTILES[-1]]
+    return {name: np.quantile(column, ends, axis=1)[:, :count] for name, column in {**nodes, **figures}.items()}
+
+
+def law_of_sets(law: "Law", around: Sequence["Surroundings"], varied: Sequence[Varied], shares: Shares) -> "Law":
+    """The law of many machines, one for each set of inputs; ``around``: of each moment of the law."""
+    from rbdyn.thermal.start import padded
+
+    dry, wet = padded(shares(0.0)), padded(shares(1.0))
+    networks = [[each.network(ratios) for each in around] for _, ratios, _ in varied]
+    return law._replace(
+        powers=law.powers * np.array([level for *_, level in varied])[:, np.newaxis, :],
+        shares=np.array([dry + thermal.film_share_to_oil * (wet - dry) for thermal, *_ in varied]),
+        matrices=np.array([[whole for whole, _ in row] for row in networks]),
+        sources=np.array([[inflow for _, inflow in row] for row in networks]),
+    )
+
+
+def varied_inputs(thermal: "Thermal", sets: Mapping[str, Array], levels: Levels) -> Iterator[Varied]:
+    """What changes with each set of inputs."""
     start = thermal.start
     for place in range(SETS if sets else 1):
         values = {key: float(column[place]) for key, column in sets.items()}

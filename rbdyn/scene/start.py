@@ -88,6 +88,10 @@ class Start(Strict):
         """Widths of the bearing over which housing and shaft count."""
         return self.housing_widths, self.shaft_widths
 
+    def temperatures(self, ambient: float) -> list[float]:
+        """Temperatures of the parts at the start [C], with ``ambient`` around the machine."""
+        return self.from_parts_C or [ambient if self.from_C is None else self.from_C] * 6
+
     def course(self, speed: float, load: float) -> "Course":
         """Speed [rad/s] and load [N] over time: those of the schedule, else ``speed`` and ``load`` of the operating point."""
         import numpy as np

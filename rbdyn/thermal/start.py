@@ -18,7 +18,7 @@ import numpy as np
 
 from rbdyn.base.arrays import Array
 from rbdyn.base.faults import RPM, MethodError
-from rbdyn.thermal.losses import DEGREES, HOTTEST
+from rbdyn.thermal.losses import DEGREES, HOTTEST, HeatModel
 from rbdyn.thermal.network import INNER, NODES, OUTER, Boundaries, Conductances, matrix, source
 
 if TYPE_CHECKING:
@@ -47,6 +47,7 @@ LEAST_EXPONENTS, MOST_EXPONENTS = (0.0, 0.0, -1.0), (1.2, 4.0, 3.0)
 # Spread of the exponents about their priors, over that of the logarithm of a power.
 PRIOR_SPREAD = 30.0
 
+NO_RATIOS: Mapping[str, float] = {}
 # Net heat of the nodes (n,) [W] at a time [s] and temperatures (n,) [C].
 NetHeat = Callable[[float, Array], Array]
 
@@ -111,6 +112,31 @@ def warming_conductances(conductances: Conductances, seats: Seats) -> WarmingCon
         found[f"{ring}_{part}"] = between
         found[f"{part}_ambient"] = way_out * between / (between - way_out) if way_out else 0.0
     return WarmingConductances(**found)
+
+
+class Surroundings(NamedTuple):
+    """How the heat of a bearing leaves it: its conductances, those of its seats, and the temperatures around it."""
+
+    conductances: Conductances
+    seats: Seats
+    boundaries: Boundaries
+
+    @property
+    def warming(self) -> WarmingConductances:
+        """Conductances between ``WARMING_NODES``."""
+        return warming_conductances(self.conductances, self.seats)
+
+    def network(self, ratios: Mapping[str, float] = NO_RATIOS) -> tuple[Array, Array]:
+        """``warming_network`` with conductances times ratios by name."""
+        scaled = {name: ratio * getattr(self.conductances, name) for name, ratio in ratios.items()}
+        varied = self._replace(conductances=self.conductances._replace(**scaled))
+        return warming_network(varied.warming, self.boundaries)
+
+
+def padded(of_nodes: Array) -> Array:
+    """Columns of ``NODES`` as those of ``WARMING_NODES``."""
+    none = np.zeros((*of_nodes.shape[:-1], len(WARMING_NODES) - len(NODES)))
+    return np.concatenate((of_nodes, none), axis=-1)
 
 
 def warming_network(conductances: WarmingConductances, boundaries: Boundaries) -> tuple[Array, Array]:
@@ -226,25 +252,22 @@ class Law(NamedTuple):
         return net
 
 
-def law_of(
-    moments: Sequence[Moment],
-    films: Array,
-    shares: Array,
-    log_viscosity: Array,
-    priors: Array,
-    reach: tuple[Array, Array],
-) -> Law:
-    """The law through moments, with exponents ``fitted`` to them about ``priors`` (terms, 3)."""
+def law_of(moments: Sequence[Moment], model: HeatModel, reach: tuple[Array, Array]) -> Law:
+    """The law through moments, with exponents ``fitted`` to them about those of a ``model``.
+
+    A film's force follows viscosity times speed, so that its power begins with one more exponent.
+    """
+    losses, viscous = model.losses, model.losses.exponents
     law = Law(
         temperatures=np.array([moment.temperatures for moment in moments]),
         courses=np.array([moment.course for moment in moments]),
         powers=np.array([moment.powers for moment in moments]),
         matrices=np.array([moment.network[0] for moment in moments]),
         sources=np.array([moment.network[1] for moment in moments]),
-        exponents=priors,
-        films=films,
-        shares=shares,
-        log_viscosity=log_viscosity,
+        exponents=np.column_stack((viscous, 1.0 + viscous, np.zeros_like(viscous))),
+        films=padded(losses.films),
+        shares=padded(model.shares),
+        log_viscosity=losses.log_viscosity,
         reach=reach,
     )
     return law._replace(exponents=fitted_exponents(law))
@@ -300,7 +323,7 @@ def rows_of(end: float, breaks: Sequence[float] = ()) -> Array:
     return np.concatenate(parts)
 
 
-def warming(
+def integrate(
     capacities: Array,
     net: NetHeat,
     start: Array,
@@ -371,14 +394,6 @@ def slowest(capacities: Array, whole: Array) -> float:
     return float(1.0 / rates.min()) if rates.min() > 0.0 else np.inf
 
 
-def settling_time(times: Array, table: Array, steady: Array, within: float) -> float | None:
-    """First time [s] from which all columns of the ``table`` (rows, n) stay ``within`` that of the ``steady`` state (n,); None without."""
-    away = np.flatnonzero(np.abs(table - steady).max(axis=1) > within)
-    if not away.size:
-        return float(times[0])
-    return float(times[away[-1] + 1]) if away[-1] + 1 < len(times) else None
-
-
 def settled_times(times: Array, table: Array, within: float) -> Array:
     """First time [s] from which all columns of the ``table`` (rows, ..., n) stay ``within`` the last ones."""
     moving = np.abs(table - table[-1]).max(axis=-1) > within
@@ -407,9 +422,3 @@ def leasts_of(times: Array, values: Array) -> tuple[Array, Array, Array]:
     slope = before + bend * (t1 - t0)
     shift = np.where(refined, -0.5 * slope / bend, 0.0)
     return least + shift * (slope + bend * shift), times[place] + shift, inside
-
-
-def least_of(times: Array, values: Array) -> tuple[float, float, bool]:
-    """As ``leasts_of`` for one column."""
-    value, time, inside = leasts_of(times, values)
-    return float(value), float(time), bool(inside)

@@ -14,7 +14,6 @@ import rbdyn
 from rbdyn.base.faults import InputError
 from rbdyn.base.words import shown
 from rbdyn.cli.ball_studies import equilibrium_blocks, write_equilibrium
-from rbdyn.quasistatic import start as start_module
 from rbdyn.quasistatic.result import BallResult
 from rbdyn.quasistatic.start import at_point, capacities, radial_clearance
 from rbdyn.quasistatic.sweep import sweep
@@ -107,7 +106,7 @@ def test_oracle_spacing_and_first_guess_of_balls_do_not_matter(cold, monkeypatch
     """Oracle: rows half as far apart, a tighter integration or another first guess give the same extremes within their errors."""
     start = cold.start
     monkeypatch.setattr("rbdyn.thermal.start.ROWS", 32.0)
-    monkeypatch.setattr(start_module, "TOLERANCE", 1e-8)
+    monkeypatch.setattr("rbdyn.thermal.start.TOLERANCE", 1e-8)
     other = rbdyn.equilibrium(_example(thermal__start={}, lubricant__temperature_C=45.0), ranges=False).start
     assert len(other.path["time_s"]) > 1.8 * len(start.path["time_s"])
     for one, two in (

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
+from rbdyn.thermal.losses import HeatModel, Losses, no_rest
 from rbdyn.thermal.network import INNER, NODES, OUTER, Boundaries, Conductances, matrix, temperatures
 from rbdyn.thermal.start import (
     HOUSING,
@@ -12,15 +13,13 @@ from rbdyn.thermal.start import (
     Course,
     Moment,
     Seats,
+    integrate,
     law_of,
-    least_of,
     leasts_of,
     rows_of,
     seat,
     settled_times,
-    settling_time,
     slowest,
-    warming,
     warming_conductances,
     warming_network,
 )
@@ -44,7 +43,7 @@ def _constant(whole, inflow, heat):
 def test_unit_constant_heat_is_a_matrix_exponential():
     """Unit: constant heat and network have the closed form T = T_s + exp(-C^-1 G t)(T_0 - T_s), within 1e-8."""
     whole, inflow = warming_network(warming_conductances(BATH, SEATS), AROUND)
-    found = warming(CAPACITIES, _constant(whole, inflow, HEAT), COLD, 4000.0, tolerance=1e-10)
+    found = integrate(CAPACITIES, _constant(whole, inflow, HEAT), COLD, 4000.0, tolerance=1e-10)
     steady = np.linalg.solve(whole, HEAT + inflow)
     for row in (1, 40, 90, -1):
         decay = expm(-whole / CAPACITIES[:, np.newaxis] * found.times[row])
@@ -56,7 +55,7 @@ def test_unit_steady_state_is_that_of_the_network():
     """Unit: with housing and shaft as nodes the four others become as warm as in the network without them."""
     whole, inflow = warming_network(warming_conductances(BATH, SEATS), AROUND)
     end = 16.0 * slowest(CAPACITIES, whole)
-    last = warming(CAPACITIES, _constant(whole, inflow, HEAT), COLD, end).temperatures[-1]
+    last = integrate(CAPACITIES, _constant(whole, inflow, HEAT), COLD, end).temperatures[-1]
     assert last[: len(NODES)] == pytest.approx(temperatures(BATH, AROUND, HEAT[: len(NODES)]), abs=1e-3)
     # The seat's resistance is in series with what leaves: the housing is colder by the heat that passes it over the seat.
     assert last[OUTER] - last[HOUSING] == pytest.approx(2.0 * (last[OUTER] - 20.0) / 60.0, abs=1e-3)
@@ -85,7 +84,7 @@ def test_unit_heat_is_stored_or_leaves():
         return np.concatenate((net(time, nodes[:6]), [heat.sum(), (whole @ nodes[:6] - inflow).sum()]))
 
     # The sums are in kilojoules, which stay below the temperature that ends a course.
-    found = warming(np.append(CAPACITIES, [1e3, 1e3]), with_sums, np.append(COLD, [0.0, 0.0]), 600.0)
+    found = integrate(np.append(CAPACITIES, [1e3, 1e3]), with_sums, np.append(COLD, [0.0, 0.0]), 600.0)
     last = found.temperatures[-1] * np.append(np.ones(6), [1e3, 1e3])
     stored = CAPACITIES @ (last[:6] - COLD)
     assert last[6] == pytest.approx(stored + last[7], rel=1e-6)
@@ -106,22 +105,22 @@ def test_unit_heat_runs_away_at_a_gain_of_one(share, steady):
         return 30.0 + gain * (nodes - 20.0) - out * (nodes - 20.0)
 
     # At the growth rate (a - G)/C the closed form is T = 20 + 30/(G - a) (1 - exp(-(G - a) t/C)).
-    found = warming(capacity, net, np.array([20.0]), 5e4, tolerance=1e-10).until_hot()
+    found = integrate(capacity, net, np.array([20.0]), 5e4, tolerance=1e-10).until_hot()
     closed = 20.0 + 30.0 / (out - gain) * -np.expm1(-(out - gain) * found.times / 100.0)
     assert found.temperatures[:, 0] == pytest.approx(closed, rel=1e-7)
-    level = warming(capacity, lambda time, nodes: np.full(1, 30.0), np.array([20.0]), 1000.0)
+    level = integrate(capacity, lambda time, nodes: np.full(1, 30.0), np.array([20.0]), 1000.0)
     assert level.temperatures[:, 0] == pytest.approx(20.0 + 0.3 * level.times, rel=1e-9)
     assert found.is_hot and found.temperatures[-1, 0] > 350.0 > found.temperatures[-2, 0]
     hot_after = -100.0 / (out - gain) * np.log1p(-330.0 * (out - gain) / 30.0)
     assert found.times[-2] < hot_after <= found.times[-1]
     # With a tenth of the heat, the one below the gain of one has a state that any oil bears.
-    cool = warming(capacity, lambda time, nodes: net(time, nodes) - 27.0, np.array([20.0]), 5e4)
+    cool = integrate(capacity, lambda time, nodes: net(time, nodes) - 27.0, np.array([20.0]), 5e4)
     assert cool.is_hot is not steady
 
 
 def _difference(capacities):
     whole, inflow = warming_network(warming_conductances(BATH, SEATS), AROUND)
-    found = warming(capacities, _constant(whole, inflow, HEAT), COLD, 8000.0).temperatures
+    found = integrate(capacities, _constant(whole, inflow, HEAT), COLD, 8000.0).temperatures
     return found[:, INNER] - found[:, OUTER]
 
 
@@ -145,19 +144,19 @@ def test_unit_rings_alike_do_not_overshoot():
     alike = Conductances(0.0, 8.0, 8.0, 12.0, 18.0, 18.0, 2.0, 2.0, 2.0)
     whole, inflow = warming_network(warming_conductances(alike, Seats(60.0, 60.0)), AROUND)
     capacities, heat = np.array([40.0, 110.0, 110.0, 100.0, 600.0, 600.0]), np.array([45.0, 25.0, 25.0, 50.0, 0.0, 0.0])
-    found = warming(capacities, _constant(whole, inflow, heat), COLD, 8000.0).temperatures
+    found = integrate(capacities, _constant(whole, inflow, heat), COLD, 8000.0).temperatures
     assert found[:, INNER] == pytest.approx(found[:, OUTER], abs=1e-7)
     assert np.diff(found[:, OUTER]).min() > -1e-5
-    assert not least_of(np.arange(len(found)), 30.0 - 0.7 * (found[:, INNER] - 20.0))[2]
+    assert not leasts_of(np.arange(len(found)), 30.0 - 0.7 * (found[:, INNER] - 20.0))[2]
 
 
 def test_unit_machines_together_warm_as_alone():
     """Unit: machines of one integration that do not meet are as warm as each of them alone."""
     law, course = _law(), _steady_course()
     capacities = CAPACITIES * np.array([0.5, 1.0, 4.0])[:, np.newaxis]
-    together = warming(capacities, law.net_heat(course), np.tile(COLD, (3, 1)), 3000.0)
+    together = integrate(capacities, law.net_heat(course), np.tile(COLD, (3, 1)), 3000.0)
     for place, own in enumerate(capacities):
-        alone = warming(own, law.net_heat(course), COLD, 3000.0)
+        alone = integrate(own, law.net_heat(course), COLD, 3000.0)
         assert together.temperatures[:, place] == pytest.approx(alone.temperatures, abs=1e-3)
 
 
@@ -169,6 +168,8 @@ def _moment(temperature, powers, course=FULL):
 FILMS = np.array([[0.0, 0.5, 0.0, 0.5, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0, 0.0, 0.0]])
 SHARES = np.array([[0.3, 0.35, 0.0, 0.35, 0.0, 0.0], [0.5, 0.0, 0.5, 0.0, 0.0, 0.0]])
 PRIORS = np.array([[0.7, 1.7, 0.0], [0.0, 1.0, 0.0]])
+LOSSES = Losses(COLD[:4], np.ones(2), PRIORS[:, 0], FILMS[:, :4], VISCOSITY)
+MODEL = HeatModel(LOSSES, SHARES[:, :4], BATH, AROUND, no_rest())
 REACH = np.vstack((FILMS / 15.0, np.array([[0.0, 0.3, -0.3, -0.2, 0.0, 0.0]]))), np.array([0.35, 0.35])
 
 
@@ -180,7 +181,7 @@ def _true_powers(temperature, course=FULL):
 
 def _law(moments=None):
     moments = moments or [_moment(20.0, _true_powers(20.0)), _moment(60.0, _true_powers(60.0))]
-    return law_of(moments, FILMS, SHARES, VISCOSITY, PRIORS, REACH)
+    return law_of(moments, MODEL, REACH)
 
 
 def _steady_course():
@@ -224,22 +225,20 @@ def test_unit_rows_and_figures_of_a_course():
     assert len(rows_of(3600.0)) < 200
     # 30 (1 - exp(-t/50)) - 40 (1 - exp(-t/400)) falls to its least where 0.6 exp(-t/50) = 0.1 exp(-t/400).
     play = 30.0 - 30.0 * -np.expm1(-times / 50.0) + 20.0 * -np.expm1(-times / 400.0)
-    least, time, inside = least_of(times, play)
+    least, time, inside = leasts_of(times, play)
     expected = np.log(0.6 / 0.05) / (1.0 / 50.0 - 1.0 / 400.0)
     assert time == pytest.approx(expected, rel=0.01) and inside
     exact = 30.0 - 30.0 * -np.expm1(-expected / 50.0) + 20.0 * -np.expm1(-expected / 400.0)
     assert least == pytest.approx(exact, rel=1e-4)
-    assert not least_of(times, -times)[2] and least_of(times, -times)[1] == 3600.0
+    assert not leasts_of(times, -times)[2] and leasts_of(times, -times)[1] == 3600.0
     table = 20.0 + 50.0 * -np.expm1(-times / 400.0)[:, np.newaxis]
-    assert settling_time(times, table, np.array([90.0]), 1.0) is None
-    assert settling_time(times, table, table[-1], 1.0) == settled_times(times, table, 1.0)
     assert settled_times(times, table, 1.0) == pytest.approx(400.0 * np.log(50.0), rel=0.05)
     assert settled_times(times, table, 90.0) == 0.0
     # Columns together have the bits of each alone, also where rows are few.
     both = np.column_stack((play, -times))
     for rows in (both, both[:2]):
         together = leasts_of(times[: len(rows)], rows)
-        alone = [least_of(times[: len(rows)], column) for column in rows.T]
+        alone = [leasts_of(times[: len(rows)], column) for column in rows.T]
         assert [tuple(map(float, each)) for each in zip(*together, strict=True)] == [
             tuple(map(float, each)) for each in alone
         ]

@@ -14,8 +14,18 @@ from rbdyn.scene import Scene
 from rbdyn.scene.fits import mounted_rings
 from rbdyn.scene.thermal import Temperatures, Thermal, part_temperatures
 from rbdyn.thermal.fixed_point import State
-from rbdyn.thermal.network import NODES, Boundaries, Conductances
-from rbdyn.thermal.start import HOUSING, SHAFT, Course, Moment, Seats, Warming, capacities_of, seats_between
+from rbdyn.thermal.network import NODES, Boundaries
+from rbdyn.thermal.start import (
+    HOUSING,
+    SHAFT,
+    Course,
+    Moment,
+    Seats,
+    Surroundings,
+    Warming,
+    capacities_of,
+    seats_between,
+)
 
 # Names of clearances in JSON by those of a scene.
 NAMES = {"radial": "radial_um", "guide": "guide_um", "pocket": "pocket_um"}
@@ -134,12 +144,11 @@ class Path(NamedTuple):
 
 
 class Simulated(NamedTuple):
-    """A simulated moment: the ``moment`` of the law, its time [s], speed [rad/s], load [N], conductances, and its power's error."""
+    """A simulated moment: the ``moment`` of the law, its time [s], speed [rad/s], load [N], what is ``around`` it, and its power's error."""
 
     moment: Moment
     time: float | None
     speed: float
     load: float
-    conductances: Conductances
-    seats: Seats
+    around: Surroundings
     scatter: float
