@@ -244,13 +244,13 @@ class Problem(Study):
 
     @cached_property
     def first_replicates(self) -> int:
-        """Replicates of a design run at first: all of them where few are more than half, or where there are limits.
+        """Replicates of a design run at first: all where few are more than half, or where the class of the cage is limited.
 
-        The class of a cage needs all replicates, and noise widens the margin to a limit.
+        All replicates together judge that class.
         """
         fewest, usual = self.file.design.fewest_replicates, self.usual_replicates
         alike = all(scene.numerics.replicates == usual for scene in scenes_of(self.usual_run))
-        return fewest if alike and 2 * fewest <= usual and not (self.is_limited or self.file.limits.classes) else usual
+        return fewest if alike and 2 * fewest <= usual and not self.file.limits.classes else usual
 
     @property
     def further_replicates(self) -> int:

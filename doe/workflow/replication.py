@@ -23,6 +23,8 @@ from rbdyn.base.words import Notice
 
 # Largest share of noise in the variance of a predicted response.
 NOISY = 0.1
+# Least room between a run and a limit, in half-widths of the run: a limit farther away does not decide the pick.
+CLEAR = 2.0
 
 
 def independent_values(runs: Runs) -> Whole:
@@ -55,13 +57,21 @@ def run_by_need(study: Problem, simulations: clearance.Simulations, progress: Pr
 
 
 def noisy(study: Problem, runs: Runs) -> list[str]:
-    """Responses with a goal whose predictions have too much noise, or an unknown amount."""
+    """Responses with a goal whose predictions have too much noise, or an unknown amount, and those with a limit near a run.
+
+    Noise widens the margin to a limit.
+    """
     errors = standard_errors(runs.errors, independent_values(runs))
     noise = np.ma.masked_invalid(errors**2).mean(axis=0).filled(np.inf)
     spread = np.ma.masked_invalid(runs.values).var(axis=0, ddof=1).filled(0.0)
     terms = np.array([len(terms_of(study, response.model)) for response in study.file.response])
     hidden = noise * terms / len(runs.coded) > NOISY * spread
-    return [study.responses[place] for place in study.goals.objectives if hidden[place]]
+    places = {place for place in study.goals.objectives if hidden[place]}
+    for place, sense, limit in study.goals.limited:
+        room = (limit - runs.values[:, place]) * (1.0 if sense == "<=" else -1.0)
+        if (room <= CLEAR * runs.errors[:, place]).any():
+            places.add(place)
+    return [study.responses[place] for place in sorted(places)]
 
 
 def _continued(study: Problem, runs: Runs, simulations: clearance.Simulations) -> Runs:

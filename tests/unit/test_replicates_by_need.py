@@ -51,13 +51,33 @@ def test_unit_few_replicates_are_at_most_half(usual, first):
         assert [s.model_dump(exclude=excluded) for s in firsts] == [s.model_dump(exclude=excluded) for s in further]
 
 
-def test_unit_a_limit_needs_all_replicates():
-    """Plan: a class of the cage is judged by all replicates, and noise widens the margin to the limit of a response."""
+def test_unit_a_class_needs_all_replicates():
+    """Plan: all replicates together judge the class of the cage; the limit of a response leaves few at first."""
     study = with_replicates(8)
     held = study.with_file(limits=OtherLimits.model_validate({"cage": {"verdict": "held"}}))
-    limited = study.file.response[0].model_copy(update={"upper": 100.0})
-    bounded = study.with_file(response=[limited, *study.file.response[1:]])
-    assert [each.first_replicates for each in (study, held, bounded)] == [4, 8, 8]
+    assert [each.first_replicates for each in (study, held, with_limits(study, upper=100.0))] == [4, 8, 4]
+
+
+def with_limits(study: Problem, **limits: float) -> Problem:
+    """The study with limits of its first response."""
+    limited = study.file.response[0].model_copy(update=limits)
+    return study.with_file(response=[limited, *study.file.response[1:]])
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_unit_a_limit_near_a_run_needs_all_replicates(side):
+    """Noise: a limit farther from every run than two of its half-widths leaves few replicates; a nearer or violated one does not."""
+    study, values = with_replicates(8), np.tile(np.linspace(90.0, 110.0, RUNS)[:, None], (1, 3))
+    errors = np.full(values.shape, 0.1)
+    runs = Runs(study.design.coded, study.design.coded, values, errors, replicates=np.full(values.shape, 1_000_000))
+    outermost = 100.0 + 10.0 * side
+    for room, near in ((0.21, False), (0.19, True), (-5.0, True)):
+        limited = with_limits(study, **{"upper" if side > 0.0 else "lower": outermost + side * room})
+        assert noisy(limited, runs) == [study.responses[0]] * near
+    # More replicates cannot make a figure without a statistical error, such as a life, more exact.
+    exact = [limited.file.response[0].model_copy(update={"goal": "none"}), *limited.file.response[1:]]
+    exact_runs = replace(runs, errors=np.where([True, False, False], np.nan, errors))
+    assert not noisy(limited.with_file(response=exact), exact_runs)
 
 
 def test_unit_noise_of_predictions():
@@ -134,7 +154,9 @@ def test_unit_other_points_are_confirmed_in_brief():
     study = with_replicates(8)
     full, brief = (study.confirmation_run(study.centre, in_brief=brief).numerics for brief in (False, True))
     assert (full.replicates, full.companions) == (study.file.confirmation.replicates, 4)
-    assert (brief.replicates, brief.companions, brief.seed) == (study.first_replicates, 0, full.seed) == (4, 0, full.seed)
+    assert (
+        (brief.replicates, brief.companions, brief.seed) == (study.first_replicates, 0, full.seed) == (4, 0, full.seed)
+    )
 
     class Runs:
         def progress(self, title):
