@@ -123,8 +123,8 @@ class Design(Consistent):
     """Seed of the design and of its runs."""
     fewest_replicates: Annotated[int, Field(ge=2, le=10000)] = 4
     """Replicates of each run at first. Default: 4, or numerics.replicates if it is less than 8 or limits.cage is set. Effect:
-    runs get the other replicates only if noise is more than a tenth of the variance of a predicted response with a goal, or if
-    a run is near a limit."""
+    runs get the others only if noise exceeds a tenth of the variance of a predicted response with a goal, or a run is near a
+    limit."""
 
     @property
     def centres(self) -> int:
