@@ -28,13 +28,13 @@ from scipy.stats import spearmanr
 
 from doe import clearance
 from doe.clearance import Simulations
-from doe.report.identity import scene_identity
 from doe.report.sections.calibration import blocks, files_of, signed, write
 from doe.running.store import Failure, Store
 from doe.unknown import inputs as unknown
 from doe.unknown.decision import wilson
 from doe.workflow.calibration import Question, find_calibration, read_question
 from doe.workflow.identification import Evidence
+from doe.workflow.status import scene_identity
 from rbdyn.base.terminal import show
 from rbdyn.scene.unknown import put
 

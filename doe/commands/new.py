@@ -30,8 +30,8 @@ from rbdyn.base.words import counted
 from rbdyn.clearances import CLEARANCES
 
 if TYPE_CHECKING:
-    from doe.commands.new_parts import Manufacture
     from doe.workflow.effort import Effort
+    from doe.workflow.parts import ClearanceParts, Manufacture
     from doe.workflow.problem import Problem
     from rbdyn.scene import Scene
     from rbdyn.scene.duty import DutyPoint
@@ -67,6 +67,9 @@ name = {name}
 share = {share!r} # {unit}
 set = {set}
 """
+# Of a study that derives its tolerances, whose chains are made to these.
+DERIVED = "would state it. Default: as [tolerances] derives it, otherwise as the factor states it"
+MARK = "estimated = true # until a drawing states it: parts and reports mark it\n"
 # By name of the response, then "upper" or "lower".
 Limits = dict[str, dict[str, float]]
 
@@ -132,7 +135,7 @@ def new(
         base = path if out is None else Path(os.path.relpath(path.resolve(), out.resolve().parent))
 
         def written(factors: list[Factor]) -> tuple[str, Problem]:
-            text = Path(__file__).with_name("new_study.toml").read_text(encoding="utf-8")
+            text = _template()
             for name, section in {**_sections(scene, factors, tolerances, chains), **sections}.items():
                 text = text.replace(f"{{{name}}}", section)
             text = fill_template(text, {"quoted": json.dumps(str(base)), "hours": "true" if hours else None})
@@ -257,19 +260,39 @@ def _sections(scene: "Scene", factors: list[Factor], tolerances: bool, chains: b
     """Factors of the study, and what it says of their parts."""
     if not tolerances and not chains:
         return {"factors": "\n".join(map(_factor_text, factors)), "parts": HINT}
-    from doe.workflow.parts import clearance_parts
+    from doe.workflow.parts import clearance_parts, manufacture_of
 
     groups = clearance_parts(scene)
-    from doe.commands.new_parts import chain_text, manufacture_of, tolerances_text
-
     manufactures = {factor.name: manufacture_of(groups[factor.name], factor.step) for factor in factors}
-    closing = [chain_text(groups[name], manufacture, tolerances) for name, manufacture in manufactures.items()]
+    closing = [_chain_text(groups[name], manufacture, tolerances) for name, manufacture in manufactures.items()]
     return {
         "factors": "\n".join(
             _factor_text(factor, manufactures[factor.name] if tolerances else None) for factor in factors
         ),
-        "parts": "\n".join([*[tolerances_text()] * tolerances, *closing * chains]).rstrip(),
+        "parts": "\n".join([*[_template("tolerances")] * tolerances, *closing * chains]).rstrip(),
     }
+
+
+def _template(part: str = "") -> str:
+    """The template of a study, or a ``part`` of it."""
+    return Path(__file__).with_name(f"new_study{part and '_'}{part}.toml").read_text(encoding="utf-8")
+
+
+def _chain_text(group: "ClearanceParts", manufacture: "Manufacture", derived: bool) -> str:
+    """A [[chain]] of a study: its links resolve to the clearance of the scene.
+
+    ``derived``: the study derives the widest tolerances, to which the parts are made; so the chain states none itself.
+    """
+    rule, stated = (DERIVED, "# ") if derived else (manufacture.rule, "")
+    head = _template("chain").format(**group._asdict(), half_width=manufacture.half_width, rule=rule, stated=stated)
+    below = {"half_width": manufacture.rollers, "half_width_below": -manufacture.rollers}
+    links = [
+        _template("roller" if part.graded else "part").format(
+            **part._asdict(), **below, mark=MARK if part.estimated else ""
+        )
+        for part in group.parts
+    ]
+    return "".join([head, *links])
 
 
 def _duty(path: Path | None, scene: "Scene") -> tuple[str, bool]:

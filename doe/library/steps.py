@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     from doe.dimension_chain import ChainResult
     from doe.response_surface.statistics import Fit
     from doe.workflow.design import DesignResult
+    from doe.workflow.front_record import SurfaceFront
     from doe.workflow.problem import Asked, Problem
-    from doe.workflow.surface_front import SurfaceFront
 
 
 def notes_record(notes: Notes) -> dict[str, Any]:
@@ -69,11 +69,11 @@ def design(path: Path | str, out: Path | str | None = None, force: bool = False)
 
     Raises InputError with all faults of the study.
     """
-    from doe.report.identity import study_identity
     from doe.report.sections.design import design_sheet
     from doe.workflow.design import DesignResult
     from doe.workflow.problem import Problem
     from doe.workflow.region import region_that_runs
+    from doe.workflow.status import study_identity
     from doe.workflow.whole import check_study
 
     path, folder = path_given(path, "path"), optional_path(out, "out")
@@ -147,9 +147,9 @@ def fit(
 
     Raises InputError with all faults of study, table or arguments, RunError where runs fail.
     """
-    from doe.report.identity import study_identity
     from doe.report.sections.fit import fit_files
     from doe.response_surface.statistics import fits_of
+    from doe.workflow.status import study_identity
     from doe.workflow.surfaces import unrivalled, with_rivals
 
     table, folder, study_path = optional_path(data, "data"), optional_path(out, "out"), optional_path(path, "path")
@@ -288,11 +288,11 @@ def front(
     """
     import numpy as np
 
-    from doe.report.identity import study_identity
     from doe.report.sections.front import front_sheet
     from doe.workflow.front import check_goals, find_front, out_of_reach, tolerances_out_of_reach, with_survival
+    from doe.workflow.front_record import StatedPoint, SurfaceFront
     from doe.workflow.problem import Asked, Problem
-    from doe.workflow.surface_front import StatedPoint, SurfaceFront
+    from doe.workflow.status import study_identity
     from doe.workflow.surfaces import extrapolation_notes
 
     path = path_given(path, "path")

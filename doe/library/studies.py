@@ -325,10 +325,9 @@ def uncertainty(
 
     Raises InputError with all faults of scene or arguments, RunError where too many runs fail.
     """
-    from doe.report.identity import scene_identity
     from doe.report.sections.unknown import write_uncertainty
     from doe.running.runner import ANSWER
-    from doe.workflow.status import content_digest, runs_digest
+    from doe.workflow.status import content_digest, runs_digest, scene_identity
     from doe.workflow.uncertainty import find_uncertainty, uncertainty_stages
     from rbdyn.base.page import REPORT_FILES, write_with_report
     from rbdyn.dynamics.target import target_of, valid_target
@@ -426,12 +425,11 @@ def calibrate(
 
     Raises InputError with all faults of scene, table or arguments, RunError where too many runs fail.
     """
-    from doe.report.identity import scene_identity
     from doe.report.sections.calibration import FILES, RECORD, files_of, signed, stored, write
     from doe.running.runner import ANSWER
     from doe.workflow.calibration import calibration_stages, design_of, find_calibration, question_of, read_question
     from doe.workflow.identification import Cost
-    from doe.workflow.status import content_digest
+    from doe.workflow.status import content_digest, scene_identity
 
     path, table = path_given(path, "path"), path_given(data, "data")
     folder, example = optional_path(out, "out") or Path(f"{path.stem}_calibration"), '["cage.mass_g"]'

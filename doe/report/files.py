@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from doe import clearance
-from doe.report.identity import study_identity
 from doe.report.page import html_report, notes, reference
 from doe.report.sections.answer import changes, first_screen, good_news
 from doe.report.sections.chain import chains, part_sheet
@@ -28,10 +27,10 @@ from doe.response_surface.statistics import fits_of
 from doe.running.store import grouped
 from doe.workflow.confirmation import ConfirmedPoint, PickLimit, statement
 from doe.workflow.duty import DutyAnswer
+from doe.workflow.front_record import EstimatedPoint, SearchResult, SurfaceFront, predicted_rows
 from doe.workflow.problem import Asked, Problem, Settings
 from doe.workflow.runs import Runs, StudyDesign
-from doe.workflow.search_record import SearchResult, predicted_rows
-from doe.workflow.surface_front import EstimatedPoint, SurfaceFront
+from doe.workflow.status import study_identity
 from doe.workflow.whole import StudyResult
 from rbdyn.base import terminal
 from rbdyn.base.arrays import Array

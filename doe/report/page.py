@@ -22,8 +22,8 @@ from doe.report.sections.design import failure_table
 from doe.report.sections.front import fronts, picks
 from doe.report.sections.record import readable, record_table
 from doe.report.summary import Summary
+from doe.workflow.front_record import EstimatedPoint, Point, RobustPoint
 from doe.workflow.problem import Asked, Factor, Response
-from doe.workflow.surface_front import EstimatedPoint, Point, RobustPoint
 from rbdyn.base import html
 from rbdyn.base.blocks import Block, Bullets, Remarks, Section, Table, Verdict, Widget
 from rbdyn.base.page import identity_section, page

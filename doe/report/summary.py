@@ -7,14 +7,13 @@ from doe.response_surface.statistics import Fits
 from doe.running.store import Cause
 from doe.workflow.confirmation import ConfirmedPoint, Gain, PickLimit
 from doe.workflow.duty import DutyAnswer
+from doe.workflow.front_record import EstimatedPoint, SearchResult, SurfaceFront
 from doe.workflow.judgement import Robust
 from doe.workflow.obstacles import Obstacles
 from doe.workflow.parts import Made
 from doe.workflow.pick import Edge
 from doe.workflow.problem import Settings
 from doe.workflow.runs import StudyDesign
-from doe.workflow.search_record import SearchResult
-from doe.workflow.surface_front import EstimatedPoint, SurfaceFront
 from doe.workflow.surfaces import PublishedComparison
 from doe.workflow.tolerances import FactorTolerance, KeptGain
 from rbdyn.base.identity import Identity

@@ -4,7 +4,7 @@
 - ``region``: where its bearings run; ``design``: its points; ``runs``: its runs; ``replication``: their
   replicates by need
 - ``surfaces``: fits, predictions, random draws, a published table; ``front``: tolerances, the front on surfaces, back-off from
-  limits, with ``surface_front`` as its record; ``adaptive``: the front by emulators, with ``search_record``
+  limits; ``adaptive``: the front by emulators; ``front_record``: the records of both
 - ``pick``: the point of the front, the edge of the region; ``tolerances``: its widest ones
 - ``parts``: parts of a clearance and their grades; ``confirmation``: simulated points, intervals, limits
 - ``obstacles``: what keeps a study from its demands, also before its runs; better simulated points
@@ -12,6 +12,6 @@
   them, with ``judgement`` as its record; ``duty``: the answer at every point of a duty
 - ``rig``: measurements; ``calibration``: inputs from them, with ``identification`` as its record
 - ``scene_table``: tables of scenes, and the runs of their rows
-- ``status``: stages and status of a command; ``effort``: threads or a cluster; ``whole``: the study, or a part of
+- ``status``: stages, identity and status of a command; ``effort``: threads or a cluster; ``whole``: the study, or a part of
   it for a job of a queue
 """

@@ -32,6 +32,8 @@ RACEWAY_GRADE, CAGE_GRADE = "IT5", "IT7"
 MICROMETRES, DIGITS = 3, 9
 # Half width of rollers of one lot [mm].
 LOT = 0.001
+# Half widths of rollers of one diameter [mm], the usual one first.
+ROLLER_HALF_WIDTHS = (0.001, 0.0005)
 GRADES = list(STANDARD_TOLERANCES)
 FINER = f"finer than {GRADES[0]}"
 # ISO 286 begins its coarse grades at this size [mm]; smaller lengths are no sizes of a part.
@@ -142,6 +144,54 @@ def _lips(scene: Scene) -> Iterator[ClearanceParts]:
 
 def _size(value: float) -> float:
     return round(value, DIGITS)
+
+
+class Manufacture(NamedTuple):
+    """How the parts of a clearance are made: half width of the clearance and of rollers [mm], and the rule in words."""
+
+    half_width: float
+    rollers: float
+    rule: str
+
+
+def manufacture_of(group: ClearanceParts, step: float) -> Manufacture:
+    """The usual grade of the parts, or the next finer one that leaves the clearance within a step [mm] of the design.
+
+    Raises InputError for a part outside the tables of ISO 286.
+    """
+    widths = [(part, _grades(group, part)) for part in group.parts if not part.graded]
+    rollers = sum(abs(part.coefficient) for part in group.parts if part.graded)
+    names = list(widths[0][1])
+    finer = names[names.index(group.grade) :: -1]
+    candidates = [
+        _by_grade(group, grade, half, widths, rollers, finer[0])
+        for half in (ROLLER_HALF_WIDTHS if rollers else ROLLER_HALF_WIDTHS[:1])
+        for grade in finer
+    ]
+    return next((candidate for candidate in candidates if candidate.half_width <= step), candidates[-1])
+
+
+def _by_grade(
+    group: ClearanceParts,
+    grade: str,
+    half: float,
+    widths: list[tuple[Part, dict[str, float]]],
+    rollers: float,
+    usual: str,
+) -> Manufacture:
+    whole = 0.5 * sum(abs(part.coefficient) * table[grade] for part, table in widths) + rollers * half
+    sizes = " and ".join(f"{part.name} {1e3 * table[grade]:g} um" for part, table in widths)
+    graded = "".join(f", {part.name} within {1e3 * half:g} um of nominal" for part in group.parts if part.graded)
+    why = "" if grade == usual else f"; {usual} would be wider than a step"
+    return Manufacture(round(whole, DIGITS), half, f"{grade} (ISO 286-1): {sizes}{graded}{why}")
+
+
+def _grades(group: ClearanceParts, part: Part) -> dict[str, float]:
+    try:
+        return grade_tolerances(part.nominal)
+    except MethodError as error:
+        why = f"{part.name} of {part.nominal:g} mm {error}"
+        raise InputError([f"{group.factor}: {why}; leave --tolerances and --chains out"]) from None
 
 
 class PartWidth(Record):

@@ -1,13 +1,13 @@
-"""The stages of a study, its record if it is finished, and the status of a command: counts of runs.
+"""The stages of a study, whose result it is, its record if it is finished, and the status of a command: counts of runs.
 
 For a plain study it loads no numerical library but numpy.
 """
 
 import json
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from itertools import product
 from pathlib import Path
@@ -24,8 +24,10 @@ from doe.workflow.region import region_in_store
 from rbdyn.base.digests import source_digest
 from rbdyn.base.faults import InputError, read_bytes, read_toml
 from rbdyn.base.files import code_version, digest_of, intact, read_json, versions
+from rbdyn.base.identity import Identity, identity_of
 from rbdyn.base.records import plain
 from rbdyn.base.tables.workbook import split_path
+from rbdyn.scene import Scene
 
 # Typical wall time [s] of surfaces, front, pictures and report.
 STEPS_S = 12.0
@@ -115,6 +117,32 @@ def named_files(study: Problem) -> list[Path]:
     names = [study.scene.file, *(chain.file for chain in study.file.chain)]
     names += [] if study.file.reference is None else [study.file.reference.file]
     return [study.path_of(name) for name in (*names, *_samples(study)) if name is not None]
+
+
+def study_identity(command: str, study: Problem, data: Path | None = None) -> Identity:
+    """Identity of a study or of a step of it; ``data``: table of runs made elsewhere. A study without a scene has no bearing."""
+    scene: Mapping[str, Any] = {}
+    if study.file.scene is not None:
+        with suppress(InputError):
+            loaded = Scene.from_dict(
+                study.read(study.scene.file), str(study.path_of(study.scene.file)), study.scene.set
+            )
+            scene = loaded.model_dump(mode="json")
+    named = [study.path, *named_files(study)] if study.file.scene is not None else [study.path]
+    identity = identity_of(command, scene, [*named, *([] if data is None else [data])])
+    return replace(identity, point=_duty_words(study)) if study.shares and scene else identity
+
+
+def _duty_words(study: Problem) -> str:
+    """'duty of idle 15 %, cruise 80 %, take-off 5 %': the points of operation of a study with their shares of the time."""
+    points = (f"{point.name} {100.0 * study.shares[point.name]:.3g} %" for point in study.file.duty)
+    return f"duty of {', '.join(points)}"
+
+
+def scene_identity(command: str, path: Path, overrides: Iterable[str], data: Path | None = None) -> Identity:
+    """Identity of a result on the scene of a file, with a table of measurements. Raises InputError."""
+    scene = Scene.load(path, overrides).model_dump(mode="json")
+    return identity_of(command, scene, [path, *([] if data is None else [data])])
 
 
 def finished_record(folder: Path, digest: str) -> dict[str, Any] | None:

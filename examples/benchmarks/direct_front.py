@@ -28,10 +28,10 @@ from doe.running.store import STORE, Failure, Store, grouped
 from doe.workflow.adaptive import Evaluator
 from doe.workflow.effort import Effort
 from doe.workflow.front import find_front
+from doe.workflow.front_record import EstimatedPoint
 from doe.workflow.problem import Problem
 from doe.workflow.replication import standard_errors
 from doe.workflow.runs import run_design
-from doe.workflow.surface_front import EstimatedPoint
 from doe.workflow.surfaces import fit_surfaces
 from rbdyn.base.arrays import Array
 from rbdyn.base.command import progress_bar

@@ -14,11 +14,11 @@ from typer.testing import CliRunner
 
 import doe
 from doe.cli import app
-from doe.report.identity import scene_identity
 from doe.report.sections.calibration import blocks, files_of, signed, stored, write
 from doe.workflow.calibration import calibration_stages, design_of, find_calibration, question_of, read_question
 from doe.workflow.identification import Calibration
 from doe.workflow.rig import read_rig
+from doe.workflow.status import scene_identity
 from rbdyn.base.terminal import text
 from rbdyn.result import Quantity
 from rbdyn.scene import Scene

@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 from doe.cli import app
 from doe.study_file.sections import Tolerances
 from doe.workflow.front import find_front
-from doe.workflow.surface_front import SurfaceFront
+from doe.workflow.front_record import SurfaceFront
 from doe.workflow.tolerances import widest_tolerances_of
 from rbdyn.base.faults import InputError
 from rbdyn.base.words import with_error

@@ -13,11 +13,10 @@ from short_studies import EXAMPLES
 
 from doe.clearance import responses_of
 from doe.commands.new import baseline_cages
-from doe.commands.new_parts import manufacture_of
 from doe.dimension_chain import chain_from, solve
 from doe.study_file.sections import StudyChain
 from doe.workflow.effort import Effort
-from doe.workflow.parts import clearance_parts
+from doe.workflow.parts import clearance_parts, manufacture_of
 from doe.workflow.problem import Problem
 from rbdyn.base.faults import InputError
 from rbdyn.base.tables.sheet import listed

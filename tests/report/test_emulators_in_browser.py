@@ -16,7 +16,7 @@ from doe.adaptive.emulators import Emulators, Runs, fit_emulators
 from doe.pareto.search import Goals
 from doe.report.page import html_report
 from doe.report.summary import Summary
-from doe.workflow.search_record import Emulated
+from doe.workflow.front_record import Emulated
 
 
 @pytest.fixture(scope="module")

@@ -4,7 +4,7 @@ import pytest
 
 from doe.report.sections.front_pictures import MOST_PAIRS, Front, drawn_pairs, near, pair_stills
 from doe.report.still import save
-from doe.workflow.surface_front import Point
+from doe.workflow.front_record import Point
 
 
 def test_unit_pairs_are_of_goals():

@@ -20,11 +20,11 @@ from short_studies import SHORT, rows, run_design, run_study, short_study, silen
 from doe.report.files import write
 from doe.workflow.confirmation import Confirmed, gains
 from doe.workflow.front import find_front
+from doe.workflow.front_record import SurfaceFront
 from doe.workflow.problem import Problem
 from doe.workflow.runs import read_runs
 from doe.workflow.status import finished_record as is_finished
 from doe.workflow.status import inputs_digest
-from doe.workflow.surface_front import SurfaceFront
 from doe.workflow.surfaces import fit_surfaces, reference_runs
 from rbdyn.base.faults import InputError, RunError
 from rbdyn.base.files import run_key

@@ -18,8 +18,8 @@ from doe.report.files import write
 from doe.report.sections.search import spent_sentence
 from doe.running.store import STORE, Store
 from doe.workflow.adaptive import advice, border_of, check_adaptive, compare_fronts, find_adaptive, region_in_units
+from doe.workflow.front_record import SearchResult
 from doe.workflow.problem import Problem
-from doe.workflow.search_record import SearchResult
 from doe.workflow.surfaces import fit_surfaces
 from rbdyn.base.faults import InputError
 

@@ -10,9 +10,7 @@ from doe.report.sections.search import in_few_runs
 from doe.report.still import Still
 from doe.report.summary import Summary
 from doe.workflow.confirmation import ConfirmedPoint, point_words
-from doe.workflow.judgement import ConfirmedGain, GainPoint, RobustFront
-from doe.workflow.problem import Asked
-from doe.workflow.surface_front import (
+from doe.workflow.front_record import (
     WITHOUT,
     EstimatedPoint,
     Point,
@@ -21,6 +19,8 @@ from doe.workflow.surface_front import (
     SurfaceLimit,
     ToleranceFront,
 )
+from doe.workflow.judgement import ConfirmedGain, GainPoint, RobustFront
+from doe.workflow.problem import Asked
 from doe.workflow.surfaces import PredictedGain
 from rbdyn.base.blocks import Block, Bullets, Column, Detail, Figures, Paragraph, Section, Sheet, Table, Widget
 from rbdyn.base.words import NORMAL, chance, counted, error_alone, label, quantity, shown, with_error

@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any
 
 from doe.report.still import COLOURS, SMALL, Point, Still, name_marks
 from doe.workflow.confirmation import ConfirmedPoint, point_words
+from doe.workflow.front_record import Point as FrontPoint
 from doe.workflow.problem import Factor
-from doe.workflow.surface_front import Point as FrontPoint
 from rbdyn.base.words import label, quantity, shown
 
 if TYPE_CHECKING:

@@ -14,8 +14,8 @@ import numpy as np
 from doe.report.still import COLOURS, SMALL, Still, name_marks
 from doe.report.summary import Summary
 from doe.workflow.adaptive import Adaptive, FrontComparison, Pull, near_limits, pulls
+from doe.workflow.front_record import SearchResult
 from doe.workflow.problem import Problem
-from doe.workflow.search_record import SearchResult
 from doe.workflow.whole import StudyResult
 from rbdyn.base.blocks import Block, Bullets, Figures, Heading, Table
 from rbdyn.base.words import counted, improvement, label, quantity, shown, with_error
