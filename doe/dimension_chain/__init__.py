@@ -1,10 +1,9 @@
 """Dimension chains: a closing link, its parts and their tolerances.
 
-- ``links``: tables of a chain and the parts of its links; ``reading``: chains from TOML, and their faults
+- ``links``: tables of a chain, the parts of its links, and their sizes on a drawing; ``reading``: chains from TOML, and their faults
 - ``closing``: the closing link as a function of its parts, expressions included, and its intervals
 - ``yields``: distributions of parts, yield of tolerances, selective assembly
 - ``allocation``: tolerances of parts from the limits of the closing link
-- ``drawing``: sizes on the steps of a drawing's resolution
 - ``refusal``: by how much a chain misses its limits, why, and what would meet them
 - ``solution``: ``solve`` and its record
 """

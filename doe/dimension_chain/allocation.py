@@ -22,15 +22,6 @@ from math import exp, inf, sqrt
 import numpy as np
 
 from doe.dimension_chain.closing import ClosingFunction, NoValueError, closing_function, interval, middle, total
-from doe.dimension_chain.drawing import (
-    at_nominal,
-    class_within,
-    least_tolerance,
-    narrower,
-    places,
-    rounded_part,
-    seat_part,
-)
 from doe.dimension_chain.links import (
     DIGITS,
     SLACK,
@@ -41,6 +32,13 @@ from doe.dimension_chain.links import (
     Mode,
     Part,
     allocated_part,
+    at_nominal,
+    class_within,
+    least_tolerance,
+    narrower,
+    places,
+    rounded_part,
+    seat_part,
     stated_part,
 )
 from doe.dimension_chain.yields import Assemblies, closing_moments, draw, exact_shares, standard_error

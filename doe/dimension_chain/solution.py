@@ -10,8 +10,17 @@ import numpy as np
 
 from doe.dimension_chain.allocation import Allocation, total_cost
 from doe.dimension_chain.closing import ClosingFunction, NoValueError, interval, linear_interval, middle
-from doe.dimension_chain.drawing import grade_words
-from doe.dimension_chain.links import DIGITS, SLACK, Chain, Distribution, Interval, Part, size_text, stated_parts
+from doe.dimension_chain.links import (
+    DIGITS,
+    SLACK,
+    Chain,
+    Distribution,
+    Interval,
+    Part,
+    grade_words,
+    size_text,
+    stated_parts,
+)
 from doe.dimension_chain.reading import faults
 from doe.dimension_chain.refusal import (
     Judge,

@@ -106,7 +106,7 @@ class FitAnswer(Answer):
 
     def blocks(self) -> list[Block]:
         from doe.report.sections.fit import fit_blocks
-        from doe.report.sections.record import readable
+        from doe.report.summary import readable
 
         fits = readable(fit_blocks(self.fits, self.factors))
         return with_notes(self.record.get("notes", ()), [Paragraph(self.columns), *fits], judged=False)
@@ -243,7 +243,7 @@ class FrontAnswer(Answer):
 
     def blocks(self) -> list[Block]:
         from doe.report.sections.front import front_blocks
-        from doe.report.sections.record import readable
+        from doe.report.summary import readable
 
         return with_notes(self.result.notes or (), readable(front_blocks(self.asked, self.result), self.asked))
 

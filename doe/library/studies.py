@@ -139,7 +139,7 @@ class StudyAnswer(Answer):
         ]
 
     def brief(self) -> str:
-        from doe.report.sections.record import LIMITS
+        from doe.report.summary import LIMITS
 
         changes = [
             f"{quantity(name)[0]} {improvement(gain.percent, gain.error_percent, gain.goal)}"

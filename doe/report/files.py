@@ -16,12 +16,18 @@ from doe.report.sections.chain import chains, part_sheet
 from doe.report.sections.design import run_sheet
 from doe.report.sections.duty import costs, duty_figures, gain_stills
 from doe.report.sections.fit import diagnostics, fit_files
-from doe.report.sections.front import front_sheet, front_stills, robust_stills
-from doe.report.sections.record import readable
-from doe.report.sections.search import in_few_runs, limiting_sentence, search_sentences, search_stills
+from doe.report.sections.front import (
+    front_sheet,
+    front_stills,
+    in_few_runs,
+    limiting_sentence,
+    robust_stills,
+    search_sentences,
+)
+from doe.report.sections.front_pictures import search_stills
 from doe.report.sections.unknown import decider_sheet, robust_input_sheet
 from doe.report.still import save
-from doe.report.summary import Summary
+from doe.report.summary import Summary, readable
 from doe.response_surface import Surface
 from doe.response_surface.statistics import fits_of
 from doe.running.store import grouped

@@ -20,8 +20,7 @@ from doe.report.sections import answer, chain, design, duty, fit, front, unknown
 from doe.report.sections.answer import tolerance_of
 from doe.report.sections.design import failure_table
 from doe.report.sections.front import fronts, picks
-from doe.report.sections.record import readable, record_table
-from doe.report.summary import Summary
+from doe.report.summary import Summary, readable, record_table
 from doe.workflow.front_record import EstimatedPoint, Point, RobustPoint
 from doe.workflow.problem import Asked, Factor, Response
 from rbdyn.base import html

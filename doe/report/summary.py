@@ -1,8 +1,16 @@
-"""The record of a whole study, shaped like summary.json: what every page, screen and table of it reads."""
+"""The record of a whole study, shaped like summary.json, and its gains, shares and probabilities written for people.
 
+Every page, screen and table of a study reads it. Names and plain numbers are written by ``rbdyn.base.words``.
+"""
+
+import math
+import re
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 from doe.dimension_chain import ChainResult
+from doe.pareto.manufacture import Interval, percent
 from doe.response_surface.statistics import Fits
 from doe.running.store import Cause
 from doe.workflow.confirmation import ConfirmedPoint, Gain, PickLimit
@@ -12,13 +20,25 @@ from doe.workflow.judgement import Robust
 from doe.workflow.obstacles import Obstacles
 from doe.workflow.parts import Made
 from doe.workflow.pick import Edge
-from doe.workflow.problem import Settings
+from doe.workflow.problem import Asked, Settings
 from doe.workflow.runs import StudyDesign
-from doe.workflow.surfaces import PublishedComparison
+from doe.workflow.surfaces import PredictedGain, PublishedComparison
 from doe.workflow.tolerances import FactorTolerance, KeptGain
+from rbdyn.base.blocks import Block, Bullets, Figures, Heading, Paragraph, Remarks, Table, Verdict, has_content
 from rbdyn.base.identity import Identity
 from rbdyn.base.notes import Note
 from rbdyn.base.records import Record
+from rbdyn.base.words import improvement, label, quantity, shown
+
+# Limits by their sense in a record.
+SENSES = {"<=": "≤", ">=": "≥"}
+VERDICTS = {"better": "▲ better", "worse": "▼ worse", "within error": "● within error"}
+SIGNS_NOTE = "▲ better, ▼ worse, ● within its 95 % error."
+LIMITS = {"kept": "✓ met", "broken": "✗ violated", "undecided": "? undecided"}
+# Characters above which a value is a sentence, which may take several lines.
+LONG = 40
+# The efficiencies of a design are named by a capital letter.
+EFFICIENCY = re.compile(r"^efficiency \[%\], ([adgi])$")
 
 
 class Summary(Record, kw_only=True):
@@ -64,3 +84,119 @@ class Summary(Record, kw_only=True):
     tolerances_gains: dict[str, KeptGain] | None = None
     tolerances_sentence: str | None = None
     tolerances_warning: str | None = None
+
+
+def scalars(record: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, str]]:
+    """Names and values of everything in nested tables; lists as one value."""
+    for key, value in record.items():
+        name = prefix + label(key)
+        if isinstance(value, Mapping):
+            yield from scalars(value, f"{name}, ")
+        elif not (isinstance(value, list) and value and isinstance(value[0], dict | list)):
+            text = probability(value) if key == "p" else shown(value)
+            if text or value in ("", []):
+                yield EFFICIENCY.sub(lambda match: f"{match[1].upper()}-efficiency [%]", name), text
+
+
+def record_table(caption: str, record: Mapping[str, Any] | None, folded: bool = False) -> Table:
+    """Everything in nested tables, a row for each value."""
+    rows = list(scalars(record or {}))
+    prose = (1,) if any(len(value) > LONG for _, value in rows) else ()
+    return Table(caption, ("", "value"), rows, folded=folded, text_columns=prose)
+
+
+def nearest(asked: Asked, place: Mapping[str, float], candidates: Mapping[str, Mapping[str, float]]) -> str:
+    """Name of the candidate whose factors are nearest to those of a place in coded units.
+
+    A pick is simulated at the resolution of the drawing, so its factors are not those of the front to the digit.
+    """
+
+    def distance(name: str) -> float:
+        steps = [abs(candidates[name][factor.name] - place[factor.name]) / factor.step for factor in asked.factors]
+        return math.hypot(*steps)
+
+    return min(candidates, key=distance)
+
+
+def readable(blocks: Iterable[Block], asked: Asked | None = None) -> list[Block]:
+    """Blocks with something to say: what was ``asked`` by its words in sentences, tables without empty columns.
+
+    A response that is a ratio to the baseline over a duty has no unit in tables and pictures.
+    """
+    names = [] if asked is None else [*asked.columns, *asked.names]
+    # The longest first, for a name may begin with another.
+    words = {name: quantity(name)[0] for name in sorted(names, key=len, reverse=True)}
+    ratios = {
+        label(response.name): response.label for response in (asked.responses if asked else ()) if response.is_ratio
+    }
+    return [_without_unit(_spelt(block, words), ratios) for block in blocks if has_content(block)]
+
+
+def _without_unit(block: Block, ratios: Mapping[str, str]) -> Block:
+    """The block with these labels replaced in its captions, cells and pictures, but not as figures at a point."""
+
+    def plain(text: str) -> str:
+        for with_unit, words in ratios.items():
+            text = re.sub(rf"(?<!: ){re.escape(with_unit)}", words, text)
+        return text
+
+    def drawn(picture: str | Callable[[], str]) -> str | Callable[[], str]:
+        return plain(picture) if isinstance(picture, str) else lambda: plain(picture())
+
+    match block:
+        case _ if not ratios:
+            return block
+        case Heading(text):
+            return replace(block, text=plain(text))
+        case Table():
+            rows = [[plain(cell) for cell in row] for row in block.rows]
+            return replace(block, caption=plain(block.caption), header=[*map(plain, block.header)], rows=rows)
+        case Figures():
+            return replace(block, pictures=[*map(drawn, block.pictures)], caption=plain(block.caption))
+    return block
+
+
+def _spelt(block: Block, words: Mapping[str, str]) -> Block:
+    def spelt(text: str) -> str:
+        for name, spoken in words.items():
+            text = text.replace(name, spoken)
+        return text
+
+    match block:
+        case Verdict(notes=notes) | Remarks(notes=notes):
+            return replace(block, notes=tuple(Note(note.code, spelt(note)) for note in notes))
+        case Paragraph(text):
+            return replace(block, text=spelt(text))
+        case Bullets(items):
+            return replace(block, items=[spelt(item) for item in items])
+        case Table():
+            return block.without_empty_columns()
+    return block
+
+
+def probability(value: float | None) -> str:
+    """A p-value, four decimals at most."""
+    if value is None or not math.isfinite(value):
+        return ""
+    return "< 0.0001" if value < 1e-4 else f"{value:.4f}"
+
+
+def share_with_interval(share: float, interval: Sequence[float] | None) -> str:
+    """'95.0 % (71.3 to 99.8 %)' of a share with the ends of its interval."""
+    ends = "" if interval is None else f" ({Interval(*interval).words})"
+    return f"{percent(share)} %{ends}"
+
+
+def sign_of(gain: Gain | PredictedGain) -> str:
+    """The verdict of a gain with a sign that needs no colour."""
+    return VERDICTS[gain.verdict]
+
+
+def signed(gain: Gain | PredictedGain) -> str:
+    """A gain with the sign of its verdict."""
+    return f"{sign_of(gain)[:1]} {change(gain)}"
+
+
+def change(gain: Gain | PredictedGain) -> str:
+    """'11.16 ± 0.65 % less' of a gain."""
+    return improvement(gain.percent, gain.error_percent, gain.goal)

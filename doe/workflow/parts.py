@@ -15,8 +15,8 @@ from typing import NamedTuple
 from doe.dimension_chain import Chain, chain_from, grade_tolerances
 from doe.dimension_chain.allocation import Allocation
 from doe.dimension_chain.closing import NoValueError
-from doe.dimension_chain.drawing import grade_words
 from doe.dimension_chain.links import Part as ChainPart
+from doe.dimension_chain.links import grade_words
 from doe.study_file.sections import StudyChain
 from doe.workflow.problem import Problem
 from rbdyn.base.arrays import Array

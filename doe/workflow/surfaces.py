@@ -19,7 +19,7 @@ from scipy.stats import spearmanr
 from doe.designs.model import second_order
 from doe.pareto.front import contrast_error, draw_coefficients
 from doe.pareto.manufacture import Quadratic, identity
-from doe.response_surface import Surface, fit, model_matrix
+from doe.response_surface import Surface, cross_validate, fit, model_matrix
 from doe.response_surface.adequacy import Diagnostics, correlation, draw_fields
 from doe.response_surface.least_squares import backward, forward, slope
 from doe.study_file.study import Fitted
@@ -86,16 +86,13 @@ def with_rivals(surfaces: Sequence[Surface]) -> list[Surface]:
     This takes about a second per response. ``rival`` stays None if too few points can be left out, or if there are too
     many runs (see `unrivalled`).
     """
-    from doe.response_surface.comparison import compare
-
     results = list(surfaces)
     for place, surface in enumerate(surfaces):
         if len(surface.data.values) > MOST_RIVALLED:
             continue
         data, matrix = surface.data, model_matrix(surface.data.points, surface.terms)
         with suppress(MethodError):
-            runs = data.points, data.values, surface.refit
-            rival = compare(*runs, name=surface.name, matrix=matrix)
+            rival = cross_validate(data.points, data.values, surface.refit, name=surface.name, matrix=matrix)
             results[place] = replace(surface, rival=rival)
     return results
 

@@ -10,8 +10,7 @@ from synthetic_study import FACTORS, RESPONSES, summary
 from doe.report.files import answer_text, blocks
 from doe.report.page import page_data, sections
 from doe.report.sections.duty import at_points, duty_figures, gain_stills
-from doe.report.sections.record import readable
-from doe.report.summary import Summary
+from doe.report.summary import Summary, readable
 from rbdyn.base import terminal
 from rbdyn.base.blocks import Detail, Paragraph, Table
 

@@ -23,9 +23,8 @@ from doe.report.sections.answer import MEANINGS
 from doe.report.sections.chain import yield_words
 from doe.report.sections.fit import _coefficient
 from doe.report.sections.front_pictures import error_bars
-from doe.report.sections.record import change, scalars
 from doe.report.still import Still
-from doe.report.summary import Summary
+from doe.report.summary import Summary, change, scalars
 from doe.unknown.decision import GainChances
 from doe.unknown.propagation import Share
 from doe.workflow.confirmation import Gain

@@ -211,9 +211,7 @@ def test_variances_of_few_replicates_are_pooled_without_bias():
 
 def test_only_a_fit_loads_scikit_learn():
     """Its import takes about a second."""
-    assert "sklearn" not in loaded_by(
-        "import doe.adaptive, doe.emulator, doe.response_surface.comparison, doe.workflow"
-    )
+    assert "sklearn" not in loaded_by("import doe.adaptive, doe.emulator, doe.response_surface, doe.workflow")
     assert "sklearn" in loaded_by(
         "from doe.emulator import fit_emulator; fit_emulator([[0.0], [1.0]], [1.0, 2.0], 0.1)"
     )

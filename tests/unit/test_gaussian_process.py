@@ -11,8 +11,7 @@ from scipy.spatial.distance import cdist
 from doe.designs import central_composite
 from doe.designs.design import replicate_groups
 from doe.emulator import fit_emulator
-from doe.response_surface import fit
-from doe.response_surface.comparison import compare
+from doe.response_surface import cross_validate, fit
 from doe.response_surface.surface import model_matrix
 
 POINTS = central_composite(2, centre_replicates=4).coded
@@ -72,7 +71,7 @@ def test_equal_values_and_exact_runs_are_followed_without_a_warning():
 
 
 def test_same_seed_same_bits():
-    one, two = (compare(POINTS, bent(POINTS), refit_of(POINTS, bent(POINTS)), name="y") for _ in range(2))
+    one, two = (cross_validate(POINTS, bent(POINTS), refit_of(POINTS, bent(POINTS)), name="y") for _ in range(2))
     assert one == two
 
 
@@ -80,7 +79,7 @@ def test_left_out_polynomial_misses_agree_with_press():
     """Closed form: without replicates the squared misses of the polynomial are the PRESS of the surface."""
     points = central_composite(2, alpha=1.0, centre_replicates=1).coded
     values = bent(points)
-    found = compare(points, values, refit_of(points, values), name="y")
+    found = cross_validate(points, values, refit_of(points, values), name="y")
     surface = refit_of(points, values)(np.arange(len(points)))
     assert found.points == len(points)
     assert found.polynomial.loo_rmse**2 * len(points) == pytest.approx(surface.press, rel=1e-9)
@@ -91,7 +90,7 @@ def test_points_that_the_polynomial_cannot_do_without_are_not_compared():
     """Without its centre a spherical design tells no square from the constant."""
     values = bent(POINTS)
     matrix = model_matrix(POINTS, ("1", "A", "B", "AB", "A^2", "B^2"))
-    found = compare(POINTS, values, refit_of(POINTS, values), name="y", matrix=matrix)
+    found = cross_validate(POINTS, values, refit_of(POINTS, values), name="y", matrix=matrix)
     assert found.points == 8
     assert "8 of 9 points" in found.sentence
 
@@ -104,7 +103,7 @@ def test_replicates_leave_together():
         seen.append(replicate_groups(POINTS)[rows])
         return refit_of(POINTS, values, "linear")(rows)
 
-    compare(POINTS, values, watched, name="y")
+    cross_validate(POINTS, values, watched, name="y")
     assert [len(np.unique(groups)) for groups in seen] == [8] * 9
     assert min(len(groups) for groups in seen) == len(POINTS) - 4
 
@@ -112,11 +111,11 @@ def test_replicates_leave_together():
 def test_the_process_is_preferred_only_where_it_is_clearly_better():
     grid = np.array([[a, b] for a in np.linspace(-2, 2, 6) for b in np.linspace(-2, 2, 3)])
     curved = np.sin(2.5 * grid[:, 0]) + 0.3 * grid[:, 1]
-    clear = compare(grid, curved, refit_of(grid, curved), name="y")
+    clear = cross_validate(grid, curved, refit_of(grid, curved), name="y")
     assert clear.recommended == "gaussian_process"
     assert clear.difference.interval[0] > 0.0
     straight = grid @ [1.0, -2.0] + np.random.default_rng(1).normal(0.0, 0.3, len(grid))
-    level = compare(grid, straight, refit_of(grid, straight, "linear"), name="y")
+    level = cross_validate(grid, straight, refit_of(grid, straight, "linear"), name="y")
     assert level.recommended == "polynomial"
     assert "keep" in level.sentence
 
@@ -124,19 +123,19 @@ def test_the_process_is_preferred_only_where_it_is_clearly_better():
 @pytest.mark.parametrize("values", [np.zeros(3), np.full(12, np.nan)])
 def test_bad_runs_are_refused(values):
     with pytest.raises(ValueError, match=r"two runs at least, a value each|not a finite number"):
-        compare(POINTS, values, refit_of(POINTS, values), name="y")
+        cross_validate(POINTS, values, refit_of(POINTS, values), name="y")
 
 
 def test_a_design_without_a_point_to_spare_is_refused():
     points = POINTS[:7]
     values = bent(points)
     with pytest.raises(ValueError, match="only 0 points can be left out"):
-        compare(points, values, refit_of(points, values), name="y")
+        cross_validate(points, values, refit_of(points, values), name="y")
 
 
 def test_many_points_are_left_out_in_groups():
     points = np.random.default_rng(2).uniform(-1.5, 1.5, (160, 2))
     values = bent(points)
-    groups = compare(points, values, refit_of(points, values), name="y")
+    groups = cross_validate(points, values, refit_of(points, values), name="y")
     assert (groups.points, groups.folds) == (160, 20)
     assert groups.recommended == "gaussian_process"

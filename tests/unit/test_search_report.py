@@ -18,7 +18,7 @@ from doe.adaptive.emulators import Region
 from doe.adaptive.search import Face
 from doe.pareto.search import REFERENCE
 from doe.report.files import write
-from doe.report.sections.search import SUFFICIENT_MISS, in_few_runs, limiting_sentence
+from doe.report.sections.front import SUFFICIENT_MISS, in_few_runs, limiting_sentence
 from doe.report.summary import Summary
 from doe.workflow.adaptive import pulls
 from doe.workflow.confirmation import Limit

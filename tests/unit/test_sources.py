@@ -80,7 +80,7 @@ def copy(tmp_path, monkeypatch):
         ("rbdyn/scene/bearing.py", "Harmonics of the outer raceway", "Waves of the outer raceway"),
         ("rbdyn/scene/bearing.py", '"""Geometry of a cylindrical roller bearing.', '"""Drawing.'),
         ("rbdyn/cli/app.py", '"', "'"),
-        ("doe/report/sections/record.py", '"', "'"),
+        ("doe/report/summary.py", '"', "'"),
     ],
 )
 def test_unit_words_and_pictures_invalidate_nothing(copy, module, old, new):

@@ -15,7 +15,7 @@ from short_studies import SHORT, paper_study, run_design, run_study, short_study
 from doe import clearance
 from doe.clearance import Simulations
 from doe.report.files import write
-from doe.report.sections.search import spent_sentence
+from doe.report.sections.front import spent_sentence
 from doe.running.store import STORE, Store
 from doe.workflow.adaptive import advice, border_of, check_adaptive, compare_fronts, find_adaptive, region_in_units
 from doe.workflow.front_record import SearchResult

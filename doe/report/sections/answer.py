@@ -13,9 +13,18 @@ from typing import TYPE_CHECKING, Any
 from doe.clearance import DrawnMotion
 from doe.report.sections.chain import DRAWN, NAMES, estimates_note, part_sheet, refusal_blocks, yield_words
 from doe.report.sections.duty import at_points, in_operation, least_words
-from doe.report.sections.record import LIMITS, SENSES, SIGNS_NOTE, change, nearest, share_with_interval, sign_of, signed
 from doe.report.still import COLOURS, FONT, GUIDE, SMALL, Still, name_marks
-from doe.report.summary import Summary
+from doe.report.summary import (
+    LIMITS,
+    SENSES,
+    SIGNS_NOTE,
+    Summary,
+    change,
+    nearest,
+    share_with_interval,
+    sign_of,
+    signed,
+)
 from doe.unknown.propagation import Share
 from doe.workflow.confirmation import LOSS, NOISE, REAL, ConfirmedPoint, Gain, Limit, point_words
 from doe.workflow.parts import Made

@@ -9,9 +9,8 @@ from doe.dimension_chain import ChainResult
 from doe.dimension_chain.links import ESTIMATED, size_text
 from doe.dimension_chain.solution import AllocatedSize, PartSize
 from doe.dimension_chain.yields import SelectiveAssembly
-from doe.report.sections.record import record_table
 from doe.report.still import COLOURS, FONT, Still, name_marks
-from doe.report.summary import Summary
+from doe.report.summary import Summary, record_table
 from rbdyn.base.blocks import (
     Block,
     Column,

@@ -5,9 +5,8 @@ from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from doe.designs.model import Evaluation
-from doe.report.sections.record import record_table
 from doe.report.still import GUIDE, Point, Still
-from doe.report.summary import Summary
+from doe.report.summary import Summary, record_table
 from doe.running.store import Cause
 from doe.workflow.design import DesignResult, DesignRun, StandardRun
 from doe.workflow.problem import Asked

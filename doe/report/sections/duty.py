@@ -5,9 +5,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from doe.report.sections.record import LIMITS, SIGNS_NOTE, change, signed
 from doe.report.still import COLOURS, GUIDE, Still, name_marks
-from doe.report.summary import Summary
+from doe.report.summary import LIMITS, SIGNS_NOTE, Summary, change, signed
 from doe.study_file.sections import at_point
 from doe.workflow.confirmation import ORDER, Gain, PickLimit, SimulatedValue
 from doe.workflow.duty import AtPoint, DutyAnswer, LifeOverDuty

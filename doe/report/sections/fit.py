@@ -7,9 +7,8 @@ from statistics import NormalDist
 from string import ascii_uppercase
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from doe.report.sections.record import probability, record_table
 from doe.report.still import GUIDE, Point, Still, name_marks
-from doe.report.summary import Summary
+from doe.report.summary import Summary, probability, record_table
 from doe.response_surface.adequacy import AnovaRow, RunDiagnostics
 from doe.response_surface.statistics import Fit, Term
 from doe.workflow.problem import Factor

@@ -1,6 +1,7 @@
-"""Pictures of the Pareto front: every pair of responses, parallel coordinates, and the search.
+"""Pictures of the Pareto front: every pair of responses, parallel coordinates, the genetic search, and the search in few runs.
 
-They are stills. ``front.js`` adds the marked point, which it finds by the axes that each picture states in ``data-front``.
+They are stills. Those of the search in few runs show how far its front came, run by run, compared with other fronts, and where each
+run was spent and why. ``front.js`` adds the marked point, which it finds by the axes that each picture states in ``data-front``.
 """
 
 import json
@@ -9,14 +10,17 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import combinations
+from textwrap import fill
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from doe.report.still import COLOURS, SMALL, Point, Still, name_marks
+from doe.report.summary import Summary
 from doe.workflow.confirmation import ConfirmedPoint, point_words
 from doe.workflow.front_record import Point as FrontPoint
+from doe.workflow.front_record import SearchResult
 from doe.workflow.problem import Factor
-from rbdyn.base.words import label, quantity, shown
+from rbdyn.base.words import label, quantity, shown, with_error
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -334,3 +338,112 @@ def hypervolume(history: Sequence[float]) -> Still:
 def _hypervolume(history: Sequence[float], axis: "Axes") -> None:
     axis.plot(range(1, len(history) + 1), history)
     axis.set(xlim=(0.0, len(history)), xlabel="generation", ylabel="hypervolume")
+
+
+Runs = dict[str, list[tuple[dict[str, float], int]]]
+# Marker and colour of the runs made for each reason.
+RUN_MARKS = {
+    "design": ("s", "blue"),
+    "improvement": ("h", "orange"),
+    "check": ("D", "green"),
+    "extension": ("^", "purple"),
+    "fresh": ("P", "ink"),
+}
+AREA = 7.0  # of a run of one replicate [pt²]
+# Size of a picture with a legend beneath, where no point lies, and letters in a line of it.
+HIGH, BOTTOM, LETTERS = 338.0, 112.0, 56
+BENEATH: dict[str, Any] = {"loc": "upper center", "bbox_to_anchor": (0.45, -0.17)}
+
+
+def spent_runs(summary: Summary, adaptive: SearchResult) -> Runs:
+    """Factors and replicates of all runs of a search by why they were made, the fresh ones at its points last."""
+    runs: Runs = {}
+    for run in adaptive.points:
+        runs.setdefault(run.why, []).append((run.factors, run.replicates))
+    return runs | {"fresh": [(point.factors, summary.asked.replicates) for point in adaptive.front]}
+
+
+class Curve(NamedTuple):
+    """Hypervolumes of a front after ``runs`` with their half-widths (0: unknown); a front without runs has one."""
+
+    role: str
+    words: str
+    runs: list[float]
+    reached: list[float]
+    doubt: list[float]
+
+
+def curves(adaptive: SearchResult) -> list[Curve]:
+    """Curves of the search, of its points by their fresh runs, and of the front on the surfaces."""
+    volumes, fresh = adaptive.compared, adaptive.compared.fresh
+    runs, doubt = ([float(getattr(state, key)) for state in adaptive.history] for key in ("runs", "deviation"))
+    prediction = (
+        f"search, predicted by its last emulators: {volumes.search[-1]:.3f} in the end; bars: their uncertainty then"
+    )
+    words = f"its points by their fresh runs: {with_error(fresh.hypervolume, fresh.error)}"
+    surfaces = f"front on the surfaces, by the same emulators: {volumes.surfaces:.3f}"
+    return [
+        Curve("front", prediction, runs, volumes.search, doubt),
+        Curve("fresh", words, [runs[-1] + adaptive.fresh], [fresh.hypervolume], [fresh.error]),
+        Curve("surrogate", surfaces, [], [volumes.surfaces], [0.0]),
+    ]
+
+
+def search_stills(summary: Summary, adaptive: SearchResult) -> list[Still]:
+    """Hypervolume against runs, and the runs over the first factor and each other one."""
+    lines, spent = curves(adaptive), spent_runs(summary, adaptive)
+    ends = f"{lines[0].reached[0]:.3f} to {lines[0].reached[-1]:.3f} in {lines[0].runs[-1]:.0f} runs"
+    words = f"Hypervolume of the search rises from {ends}"
+    first, *others = summary.asked.columns
+    places = [
+        Still(
+            f"{sum(map(len, spent.values()))} runs over {label(first)} and {label(other)}",
+            partial(_where, spent, summary.pick, first, other),
+            height=HIGH,
+            bottom_margin=BOTTOM,
+        )
+        for other in others
+    ]
+    return [Still(words, partial(_progress, lines), height=HIGH, bottom_margin=BOTTOM), *places]
+
+
+def _progress(lines: Sequence[Curve], axis: "Axes") -> None:
+    """Hypervolume against runs; a front of no runs of its own is a line with a band."""
+    for role, words, runs, reached, doubt in lines:
+        mark, colour = RUN_MARKS.get(role, ("o", "blue" if runs else "quiet"))
+        color, entry = COLOURS[colour], fill(words, LETTERS)
+        if runs:
+            line, _, _ = axis.errorbar(
+                runs, reached, doubt, fmt=f"{mark}-", color=color, ecolor=COLOURS["ink"], capsize=3, label=entry
+            )
+            titles = [f"{x:.0f} runs: {y:.3f}" for x, y in zip(runs, reached, strict=True)]
+            name_marks(line, role, titles)
+        else:
+            line = axis.axhline(reached[0], color=color, linestyle="--", label=entry)
+            name_marks(line, role)
+    axis.set(xlabel="runs", ylabel="hypervolume (larger is better)")
+    axis.legend(**BENEATH)
+
+
+def _where(spent: Runs, pick: Mapping[str, float], one: str, two: str, axis: "Axes") -> None:
+    """All runs over two factors."""
+    for why, runs in spent.items():
+        mark, colour = RUN_MARKS[why]
+        x, y = ([point[name] for point, _ in runs] for name in (one, two))
+        sizes = [AREA * count for _, count in runs]
+        points = axis.scatter(
+            x, y, sizes, COLOURS[colour], marker=mark, edgecolors=COLOURS["paper"], linewidths=0.8, label=why
+        )
+        name_marks(points, why, [f"{why}, {count} replicates" for _, count in runs])
+    (star,) = axis.plot(
+        pick[one],
+        pick[two],
+        "*",
+        color=COLOURS["vermilion"],
+        markeredgecolor=COLOURS["paper"],
+        markersize=15,
+        label="selected design",
+    )
+    name_marks(star, "pick", ["selected design"])
+    axis.set(xlabel=label(one), ylabel=label(two))
+    axis.legend(ncol=3, markerscale=0.8, title="size: replicates", title_fontsize=SMALL, **BENEATH)

@@ -5,8 +5,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from doe.report.sections.record import SENSES
-from doe.report.summary import Summary
+from doe.report.summary import SENSES, Summary
 from doe.unknown.propagation import SHARE_LEVEL, Share
 from doe.workflow.judgement import Decider, Robust
 from doe.workflow.uncertainty import OutputRange, Uncertainty
