@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike
 from doe.designs.design import Region, replicate_groups
 from rbdyn.base.arrays import Array, Rows
 from rbdyn.base.faults import MethodError
-from rbdyn.base.records import Record
+from rbdyn.base.records import Record, shown
 
 Model = Literal["linear", "interaction", "pure_quadratic", "quadratic", "reduced"]
 MODELS: tuple[str, ...] = get_args(Model)
@@ -118,10 +118,10 @@ class PredictionVariance(Record):
 class Shell(Record):
     """Scaled prediction variance over 3^k - 1 directions at a radius."""
 
-    radius: float
-    min: float
-    mean: float
-    max: float
+    radius: float = shown("radius", ".3f")
+    min: float = shown("least", ".3f")
+    mean: float = shown("mean", ".3f")
+    max: float = shown("largest", ".3f")
 
 
 class DesignSpace(Record):

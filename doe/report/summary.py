@@ -11,6 +11,7 @@ from typing import Any
 
 from doe.dimension_chain import ChainResult
 from doe.pareto.manufacture import Interval, percent
+from doe.response_surface.adequacy import probability
 from doe.response_surface.statistics import Fits
 from doe.running.store import Cause
 from doe.workflow.confirmation import ConfirmedPoint, Gain, PickLimit
@@ -172,13 +173,6 @@ def _spelt(block: Block, words: Mapping[str, str]) -> Block:
         case Table():
             return block.without_empty_columns()
     return block
-
-
-def probability(value: float | None) -> str:
-    """A p-value, four decimals at most."""
-    if value is None or not math.isfinite(value):
-        return ""
-    return "< 0.0001" if value < 1e-4 else f"{value:.4f}"
 
 
 def share_with_interval(share: float, interval: Sequence[float] | None) -> str:

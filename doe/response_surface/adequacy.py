@@ -40,7 +40,7 @@ from doe.designs.design import replicate_groups
 from doe.designs.model import Terms, needed
 from doe.response_surface.least_squares import LeastSquares
 from rbdyn.base.arrays import Array, Whole
-from rbdyn.base.records import Record, derived, finite, keyed
+from rbdyn.base.records import Record, derived, finite, keyed, shown
 
 KEEP_BELOW = 0.05  # p-value up to which a term stays in a reduced model
 EXACT = 1e-12  # 1 - leverage below which the fit passes through a run, whatever its value
@@ -51,18 +51,25 @@ REACH = 1.0  # correlation length of the model error in coded units, half the ed
 Source = Literal["repeats", "known variance", "residual"]
 
 
+def probability(value: float | None) -> str:
+    """A p-value, four decimals at most."""
+    if value is None or not math.isfinite(value):
+        return ""
+    return "< 0.0001" if value < 1e-4 else f"{value:.4f}"
+
+
 class AnovaRow(Record):
     """One row of an analysis of variance; ``ss`` of a term is partial (type III).
 
     ``df`` is None for a variance that is known exactly.
     """
 
-    source: str
-    ss: float | None
-    df: int | None
-    ms: float | None
-    f: float | None
-    p: float | None
+    source: str = shown("source", lambda source: source.replace("_", " "))
+    ss: float | None = shown("sum of squares", 5, unit="response squared", meaning="sum of squares")
+    df: int | None = shown("df", meaning="degrees of freedom; sum of squares over them (mean square)")
+    ms: float | None = shown("mean square", 5)
+    f: float | None = shown("F", meaning="F ratio, and the probability of one as large by chance")
+    p: float | None = shown("p", probability)
 
 
 class Removal(Record):
@@ -199,14 +206,18 @@ class RunDiagnostics(Record):
     externally studentized one, with s from the fit without the run; None where undefined.
     """
 
-    run: int
-    observed: float
-    predicted: float
-    residual: float
-    standardized: float | None
-    studentized: float | None
-    leverage: float
-    cook: float | None
+    run: int = shown("run")
+    observed: float = shown(
+        "observed", 5, unit="of the response", meaning="simulated, by the surface, and their difference"
+    )
+    predicted: float = shown("predicted", 5)
+    residual: float = shown("residual", 5)
+    standardized: float | None = shown(
+        "standardized", 5, meaning="residual over its standard deviation, with the run and without it"
+    )
+    studentized: float | None = shown("studentized", 5)
+    leverage: float = shown("leverage", 5, meaning="weight of the run in its own prediction, 0 to 1")
+    cook: float | None = shown("cook", 5, meaning="by how much the run moves all predictions (Cook's distance)")
 
 
 class Normality(Record):

@@ -35,7 +35,7 @@ from doe.response_surface.adequacy import (
 from doe.response_surface.least_squares import BoxCox, Data
 from rbdyn.base.arrays import Array
 from rbdyn.base.estimate import LEVEL
-from rbdyn.base.records import Record, derived, keyed, outside_json
+from rbdyn.base.records import Record, derived, keyed, outside_json, shown, written
 
 FLAT = 1e-10  # curvature as a share of the largest coefficient below which it is rounding
 Nature = Literal["minimum", "maximum", "saddle"]
@@ -156,15 +156,17 @@ class PureError(Record):
 class Term(Record):
     """A coefficient with its test, its 95 % interval, its variance inflation, and the same coefficient in actual units."""
 
-    term: str
-    coefficient: float
+    term: str = shown("term")
+    coefficient: float = shown(
+        "coefficient ± standard error", error="standard_error", unit="of the response", meaning="in coded factors"
+    )
     standard_error: float
-    t: float | None
+    t: float | None = written("t value, and its probability by chance")
     p: float | None
-    low: float
-    high: float
-    vif: float | None
-    actual_units: float
+    low: float = shown("95 % from", 5, unit="of the response", meaning="95 % interval of the coefficient")
+    high: float = shown("to", 5)
+    vif: float | None = shown("VIF", 5, meaning="by how much other terms inflate its variance")
+    actual_units: float = written("the same coefficient for factors in their own units")
 
 
 class Tested(Record):

@@ -4,14 +4,14 @@ from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from doe.designs.model import Evaluation
+from doe.designs.model import Evaluation, Shell
 from doe.report.still import GUIDE, Point, Still
 from doe.report.summary import Summary, record_table
 from doe.running.store import Cause
 from doe.workflow.design import DesignResult, DesignRun, StandardRun
 from doe.workflow.problem import Asked
 from doe.workflow.runs import StudyDesign, StudyRun
-from rbdyn.base.blocks import Block, Column, Detail, Figures, Paragraph, Section, Sheet, Table
+from rbdyn.base.blocks import Block, Column, Detail, Figures, Paragraph, Section, Sheet, Table, columns_of
 from rbdyn.base.records import quoted_cell
 from rbdyn.base.words import counted, shown
 
@@ -175,18 +175,13 @@ def design_blocks(result: DesignResult) -> list[Block]:
     ]
 
 
-SHELLS: tuple[Column[Any], ...] = (
-    Column("radius", ".3f"), Column("min", ".3f", "least"), Column("mean", ".3f"), Column("max", ".3f", "largest")
-)  # fmt: skip
-
-
 def _evaluation_tables(evaluation: Evaluation) -> list[Block]:
     """Quality of the design for the largest model of the study: as a whole, by term, by radius."""
     region = evaluation.region
     size = f"{'radius' if region.shape == 'ball' else 'half-width'} {region.reach:.4g}"
     model = f"{str(evaluation.model).replace('_', ' ')} model, {counted(len(evaluation.terms), 'term')}"
     title = f"{model}, over the {region.shape} of {size} (coded)"
-    shells = Sheet("Scaled prediction variance by radius", SHELLS, evaluation.by_radius, detail=Detail.ALL)
+    shells = Sheet("Scaled prediction variance by radius", columns_of(Shell), evaluation.by_radius, detail=Detail.ALL)
     return [
         Table(title, ("", "value"), _figures(evaluation), text_columns=(1,), detail=Detail.USUAL),
         power_sheet(evaluation).block,

@@ -8,11 +8,24 @@ from string import ascii_uppercase
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from doe.report.still import GUIDE, Point, Still, name_marks
-from doe.report.summary import Summary, probability, record_table
-from doe.response_surface.adequacy import AnovaRow, RunDiagnostics
+from doe.report.summary import Summary, record_table
+from doe.response_surface.adequacy import AnovaRow, RunDiagnostics, probability
 from doe.response_surface.statistics import Fit, Term
 from doe.workflow.problem import Factor
-from rbdyn.base.blocks import Block, Bullets, Column, Detail, Figures, Heading, Paragraph, Section, Sheet, Table, Widget
+from rbdyn.base.blocks import (
+    Block,
+    Bullets,
+    Column,
+    Detail,
+    Figures,
+    Heading,
+    Paragraph,
+    Section,
+    Sheet,
+    Table,
+    Widget,
+    columns_of,
+)
 from rbdyn.base.records import plain
 from rbdyn.base.words import counted, label, quantity, shown, with_error
 
@@ -47,57 +60,24 @@ QUALITY: tuple[Column[Fit], ...] = (
     Column("", probability, "p of lack of fit", at=("lack_of_fit", "p")),
 )
 STATISTICS = QUALITY[2:-1]
-ANOVA_COLUMNS: tuple[Column[AnovaRow], ...] = (
-    RESPONSE,
-    Column("source", lambda source: source.replace("_", " ")),
-    Column("ss", 5, "sum of squares", unit="response squared", meaning="sum of squares"),
-    Column("df", meaning="degrees of freedom; sum of squares over them (mean square)"),
-    Column("ms", 5, "mean square"),
-    Column("f", words="F", meaning="F ratio, and the probability of one as large by chance"),
-    Column("p", probability),
-    SIGNIFICANCE,
-)
-TERM_COLUMNS: tuple[Column[Term], ...] = (
-    RESPONSE,
-    Column("term"),
-    Column("coefficient", words="coefficient ± standard error", error="standard_error", unit="of the response",
-           meaning="in coded factors"),
-    Column("t", screen=False, meaning="t value, and its probability by chance"),
-    Column("p", screen=False),
-    Column("low", 5, "95 % from", unit="of the response", meaning="95 % interval of the coefficient"),
-    Column("high", 5, "to"),
-    Column("", 5, "t", at="t"),
-    Column("", probability, "p", at="p"),
-    SIGNIFICANCE,
-    Column("vif", 5, "VIF", meaning="by how much other terms inflate its variance"),
-    Column("actual_units", screen=False, meaning="the same coefficient for factors in their own units"),
-)  # fmt: skip
-RUN_COLUMNS: tuple[Column[RunDiagnostics], ...] = (
-    RESPONSE,
-    Column("run"),
-    Column("observed", 5, unit="of the response", meaning="simulated, by the surface, and their difference"),
-    Column("predicted", 5),
-    Column("residual", 5),
-    Column("standardized", 5, meaning="residual over its standard deviation, with the run and without it"),
-    Column("studentized", 5),
-    Column("leverage", 5, meaning="weight of the run in its own prediction, 0 to 1"),
-    Column("cook", 5, meaning="by how much the run moves all predictions (Cook's distance)"),
-)
+TERM_COLUMNS = columns_of(Term)
+# On the screen the test of a coefficient follows its interval.
+TESTED: tuple[Column[Term], ...] = (Column("", 5, "t", at="t"), Column("", probability, "p", at="p"), SIGNIFICANCE)
 
 
 ANOVA = Sheet(
-    "Analysis of variance", ANOVA_COLUMNS, note=LEGEND, detail=Detail.USUAL, file="anova.csv",
+    "Analysis of variance", (RESPONSE, *columns_of(AnovaRow), SIGNIFICANCE), note=LEGEND, detail=Detail.USUAL, file="anova.csv",
     content="Analysis of variance, one row per source of each response.",
 )  # fmt: skip
 TERMS = Sheet(
     "Coefficients",
-    TERM_COLUMNS,
+    (RESPONSE, *TERM_COLUMNS[:7], *TESTED, *TERM_COLUMNS[7:]),
     detail=Detail.USUAL,
     file="coefficients.csv",
     content="One row per term of each surface.",
 )
 RUNS = Sheet(
-    "Runs and residuals", RUN_COLUMNS, folded=True, detail=Detail.ALL, file="runs.csv",
+    "Runs and residuals", (RESPONSE, *columns_of(RunDiagnostics)), folded=True, detail=Detail.ALL, file="runs.csv",
     content="Diagnostics, one row per run of each response.",
 )  # fmt: skip
 

@@ -1,15 +1,15 @@
 """What a person sees of a table of scenes: how many rows ended, the span of the main figures, and the causes of failures."""
 
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
 
 from doe.running.store import Cause
 from doe.workflow.scene_table import RowRun, causes_of
-from rbdyn.base.blocks import Block, Column, Paragraph, Sheet, with_notes
+from rbdyn.base.blocks import Block, Column, Paragraph, Sheet, columns_of, with_notes
 from rbdyn.base.notes import Notes
-from rbdyn.base.words import counted, quantity
+from rbdyn.base.records import Record, shown
+from rbdyn.base.words import counted, label
 from rbdyn.dynamics.figures import FIGURES
 
 # Rows that a table names of one cause.
@@ -18,32 +18,17 @@ ROWS_NAMED = 8
 SHOWN = ("impact_force_N", "whirl_deviation_ratio", "power_loss_W", "cage_slip")
 
 
-class Span(NamedTuple):
+class Span(Record):
     """A figure over all rows: the least, the median and the largest value, and the names of the rows with the ends."""
 
-    figure: str
-    low: float
-    low_row: str
-    median: float
-    high: float
-    high_row: str
+    figure: str = shown("figure", label)
+    low: float = shown("least")
+    low_row: str = shown("in row", text=True)
+    median: float = shown("median")
+    high: float = shown("largest")
+    high_row: str = shown("in row", text=True)
 
 
-SPANS: tuple[Column[Span], ...] = (
-    Column(
-        "figure",
-        cell=lambda span: " ".join(
-            filter(
-                None, (quantity(span.figure)[0], f"[{quantity(span.figure)[1]}]" if quantity(span.figure)[1] else "")
-            )
-        ),
-    ),
-    Column("low", words="least"),
-    Column("low_row", words="in row", text=True),
-    Column("median"),
-    Column("high", words="largest"),
-    Column("high_row", words="in row", text=True),
-)
 CAUSES: tuple[Column[Cause], ...] = (
     Column("cause", text=True, meaning="cause of the failure"),
     Column("count", "d", "rows", at=lambda cause: len(cause.runs), meaning="number of rows that failed for it"),
@@ -68,7 +53,7 @@ def span_sheet(runs: Sequence[RowRun]) -> Sheet[Span]:
         if numbers := [(value, run.row.name) for run in runs if (value := run.value(name)) is not None]:
             (low, low_row), (high, high_row) = min(numbers), max(numbers)
             spans.append(Span(name, low, low_row, float(np.median([value for value, _ in numbers])), high, high_row))
-    return Sheet("Results over all rows", SPANS, spans)
+    return Sheet("Results over all rows", columns_of(Span), spans)
 
 
 def scene_run_blocks(runs: Sequence[RowRun], part: str, notes: Notes) -> list[Block]:

@@ -3,14 +3,15 @@
 import csv
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from doe.report.summary import SENSES, Summary
 from doe.unknown.propagation import SHARE_LEVEL, Share
 from doe.workflow.judgement import Decider, Robust
 from doe.workflow.uncertainty import OutputRange, Uncertainty
-from rbdyn.base.blocks import Block, Bullets, Column, Paragraph, Section, Sheet, Table, with_notes
+from rbdyn.base.blocks import Block, Bullets, Column, Paragraph, Section, Sheet, Table, columns_of, with_notes
 from rbdyn.base.files import write_json
+from rbdyn.base.records import Record, written
 from rbdyn.base.tables.sheet import text_of
 from rbdyn.base.words import counted, quantity, shown, with_error
 from rbdyn.scene.unknown import UnknownInput
@@ -36,23 +37,16 @@ RANGES: tuple[Column[OutputRange], ...] = (
 )
 
 
-class InputShare(NamedTuple):
+class InputShare(Record):
     """An input's share of the variance of an output, with its interval."""
 
-    output: str
-    input: str
-    share_percent: float
+    output: str = written("figure")
+    input: str = written("key of the input")
+    share_percent: float = written("share of the variance, with its interval")
     low_percent: float
     high_percent: float
 
 
-SHARES: tuple[Column[InputShare], ...] = (
-    Column("output", meaning="figure"),
-    Column("input", meaning="key of the input"),
-    Column("share_percent", meaning="share of the variance, with its interval"),
-    Column("low_percent"),
-    Column("high_percent"),
-)
 INPUTS: tuple[Column[UnknownInput], ...] = (
     Column("input", at="key", meaning="key of the input"),
     *(
@@ -77,7 +71,13 @@ def share_sheet(outputs: Iterable[OutputRange]) -> Sheet[InputShare]:
         for output in outputs
         for key, share in output.shares.items()
     ]
-    return Sheet("", SHARES, rows, file="shares.csv", content="The share of each input in the variance of each output.")
+    return Sheet(
+        "",
+        columns_of(InputShare),
+        rows,
+        file="shares.csv",
+        content="The share of each input in the variance of each output.",
+    )
 
 
 def input_sheet(inputs: Iterable[UnknownInput], *columns: Column[UnknownInput]) -> Sheet[UnknownInput]:
