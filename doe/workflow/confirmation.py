@@ -15,6 +15,7 @@ from doe.duty import DutyResult, Simulated, cages_of
 from doe.running.store import Failure
 from doe.unknown.propagation import Share
 from doe.workflow.problem import Problem
+from doe.workflow.runs import EstimatedValue
 from doe.workflow.surfaces import gain_verdict
 from rbdyn.base.arrays import Array, one_thread
 from rbdyn.base.estimate import Estimate, chance_above, one_sided, standard_errors, times_wider
@@ -429,18 +430,6 @@ class SimulatedValue(Record):
         return cls(quantity.value, quantity.statistical_error, quantity.numerical_error)
 
 
-class Temperature(Record):
-    """A steady temperature [C] with its 95 % half-width, None if unknown."""
-
-    value: float
-    error: float | None
-
-    @property
-    def text(self) -> str:
-        """The temperature with its error."""
-        return with_error(self.value, self.error)
-
-
 class Balance(Record):
     """Heat balance of a point: 5, 50 and 95 % of its temperatures and clearances over its inputs; None without ranges."""
 
@@ -462,7 +451,7 @@ class ConfirmedPoint(Record, kw_only=True):
     every_limit: list[Limit]
     cage: dict[str, CageVerdict]
     friction_check: dict[str, float | None] | None = None
-    temperatures_C: dict[str, Temperature] | None = None  # noqa: N815
+    temperatures_C: dict[str, EstimatedValue] | None = None  # noqa: N815
     thermal: Balance | None = None
     gains: dict[str, Gain] | None = None
     statement: str | None = None
@@ -490,12 +479,12 @@ class ConfirmedPoint(Record, kw_only=True):
         )
 
 
-def _temperatures(result: Simulated) -> dict[str, Temperature] | None:
+def _temperatures(result: Simulated) -> dict[str, EstimatedValue] | None:
     """Steady temperatures by response; None without a heat balance, and over a duty."""
     if isinstance(result, DutyResult) or result.temperatures_C is None:
         return None
     nodes = {name: result.temperatures_C[node] for name, node in TEMPERATURES.items()}
-    return {name: Temperature(figure.value, figure.stated_error) for name, figure in nodes.items()}
+    return {name: EstimatedValue(figure.value, figure.stated_error) for name, figure in nodes.items()}
 
 
 class PickLimit(Record):

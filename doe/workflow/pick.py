@@ -36,6 +36,7 @@ from doe.workflow.confirmation import (
 )
 from doe.workflow.front import SURFACE_DRAWS, Draws, ErrorField, Misses, find_front, standard_errors_of, tolerance_box
 from doe.workflow.problem import Problem
+from doe.workflow.runs import EstimatedValue
 from doe.workflow.surfaces import CHUNK, jacobian, quadratics
 from rbdyn.base.arrays import Array, Whole
 from rbdyn.base.faults import InputError
@@ -331,17 +332,10 @@ class Place(NamedTuple):
         return f"{point} is farther out than any run: the surfaces extrapolate there." if self.beyond else ""
 
 
-class BeyondBound(Record):
-    """Improvement of a response beyond a bound in its unit, with its 95 % half-width, None if unknown."""
-
-    value: float
-    error: float | None
-
-
 class Outward(Record):
     """A factor whose pick lies at a bound of the region, and how each response with a goal changes beyond it.
 
-    ``gains`` by response: improvement over ``per``, a micrometre of a factor in millimetres, else one unit of the factor.
+    ``gains`` by response: improvement in its unit over ``per``, a micrometre of a factor in millimetres, else one unit of the factor.
     ``source`` is "the surfaces" or "simulation".
     """
 
@@ -349,7 +343,7 @@ class Outward(Record):
     bound: float
     per: str
     source: str
-    gains: dict[str, BeyondBound]
+    gains: dict[str, EstimatedValue]
 
     def sentence(self, factor: str, goals: Mapping[str, str]) -> str:
         """The bound and the change beyond it, in two sentences; ``goals`` by response, of a small value unless stated."""
@@ -430,7 +424,7 @@ def edge_of(
             gains, source = _gains_on_surfaces(study, pick.point, index, side), "the surfaces"
         unit, scale = ("µm", MICROMETRE_MM) if study.factors[index].endswith("_mm") else ("unit", 1.0)
         bound = float(ends[index, int(side > 0)])
-        per_unit = {name: BeyondBound(gain * scale, finite(error * scale)) for name, (gain, error) in gains.items()}
+        per_unit = {name: EstimatedValue(gain * scale, finite(error * scale)) for name, (gain, error) in gains.items()}
         outward[study.factors[index]] = Outward("upper" if side > 0 else "lower", bound, unit, source, per_unit)
     goals = {response.name: response.goal for response in study.file.response}
     sentences = [bound.sentence(name, goals) for name, bound in outward.items()]

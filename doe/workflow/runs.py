@@ -25,7 +25,7 @@ from rbdyn.base.arrays import Array, Mask, Whole
 from rbdyn.base.faults import RunError
 from rbdyn.base.notes import DANGER, Note, Notes
 from rbdyn.base.records import Record, finite
-from rbdyn.base.words import are, counted
+from rbdyn.base.words import are, counted, with_error
 from rbdyn.result import SimulationResult
 
 # Times that failed runs are replaced: the last ones may fail too.
@@ -227,17 +227,22 @@ def read_runs(study: Problem, path: Path) -> Runs:
     return Runs(coded, table.actual, table.values, table.errors, table.notes, table.replicates, table.block)
 
 
-class RunResponse(Record):
-    """A response of a run with the half width of its 95 % interval, None where that is unknown."""
+class EstimatedValue(Record):
+    """A value with the half width of its 95 % interval, None where that is unknown."""
 
     value: float
     error: float | None
+
+    @property
+    def text(self) -> str:
+        """The value with its error."""
+        return with_error(self.value, self.error)
 
 
 class StudyRun(DesignRun):
     """A run with its responses by name, none of a failed one."""
 
-    responses: dict[str, RunResponse]
+    responses: dict[str, EstimatedValue]
 
 
 class StudyDesign(Record, kw_only=True):
@@ -257,7 +262,7 @@ class StudyDesign(Record, kw_only=True):
         rows = zip(runs.values.tolist(), runs.errors.tolist(), strict=True)
         results = {
             place: {
-                name: RunResponse(value, finite(error))
+                name: EstimatedValue(value, finite(error))
                 for name, value, error in zip(study.responses, values, errors, strict=True)
             }
             for place, (values, errors) in zip(runs.places, rows, strict=True)

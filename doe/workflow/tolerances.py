@@ -24,7 +24,7 @@ from doe.workflow.parts import Grade, PartWidth, grades_of
 from doe.workflow.problem import Problem
 from doe.workflow.surfaces import predict_all
 from rbdyn.base.arrays import Array, Rows
-from rbdyn.base.records import Record
+from rbdyn.base.records import Record, derived, nullable, outside_json
 from rbdyn.base.words import improvement, label, quantity, rounded_down, shown
 from rbdyn.scene import Scene
 
@@ -33,31 +33,28 @@ GAIN = "the gain of "
 MIDDLE = (0.025, 0.975)  # quantiles of a response among the parts
 
 
-@dataclass(frozen=True)
-class Demand:
-    """A response with a goal, its predicted gain in percent of the baseline, and the ``least`` of it that a part keeps.
+class KeptGain(Record):
+    """A predicted gain of a response with a goal, the least of it that a part keeps, and the range of a gain that does not count.
 
-    ``least`` is None for a gain that does not count.
+    All are in percent of the baseline; the least is None for a gain that does not count, the range for one that does.
     """
 
-    response: str
-    goal: str
-    percent: float
-    least: float | None
+    predicted_percent: float
+    at_least_percent: float | None
+    counts: bool = derived(lambda self: self.at_least_percent is not None)
+    parts_percent: tuple[float, ...] | None = nullable(default=None)
+    response: str = outside_json(default="")
+    goal: str = outside_json(default="")
 
     @property
     def words(self) -> str:
         """'impact force'."""
         return quantity(self.response)[0]
 
-    def let_go(self, response: str) -> "Demand":
-        """The same demand, but none for the gain of ``response``."""
-        return replace(self, least=None) if self.response == response else self
-
 
 def demands_of(
     study: Problem, settings: Tolerances, percent: Array, simulated: tuple[Confirmed, Confirmed] | None = None
-) -> tuple[Demand, ...]:
+) -> list[KeptGain]:
     """Demands on the responses with a goal, whose predicted gains are ``percent`` (q,) of the baseline.
 
     ``simulated``: baseline and pick, which say whether a gain is real; without them every gain above zero is.
@@ -71,9 +68,10 @@ def demands_of(
         simulated and {name for name, gain in gains(study, *simulated).items() if gain.percent > gain.error_percent},
     )
     least = {name: settings.at_least.get(name, settings.keep * by_name[name]) for name in names if name in counted}
-    return tuple(
-        Demand(response.name, response.goal, by_name[response.name], least.get(response.name)) for response in responses
-    )
+    return [
+        KeptGain(by_name[response.name], least.get(response.name), response=response.name, goal=response.goal)
+        for response in responses
+    ]
 
 
 def _counted(settings: Tolerances, percent: Mapping[str, float], real: Collection[str] | None) -> Collection[str]:
@@ -117,28 +115,17 @@ class FactorTolerance(Record):
         return ": ".join(filter(None, (self.grade or "", ", ".join(parts))))
 
 
-class KeptGain(Record):
-    """A predicted gain, the least of it that a part keeps, and the range of a gain that does not count, all in percent."""
-
-    predicted_percent: float
-    at_least_percent: float | None
-    counts: bool
-    parts_percent: tuple[float, ...] | None
-
-
 @dataclass(frozen=True, eq=False)
 class PickTolerances:
     """The widest tolerances of a pick, with the ``demands`` on its gains and the ``grades`` of the parts by factor.
 
-    ``free``: lowest and highest gain [%] of 95 % of the parts, by response whose gain does not count. ``relaxed``: the
-    tolerances without the limiting gain, None where no grade is too fine or no gain limits.
+    ``relaxed``: the tolerances without the limiting gain, None where no grade is too fine or no gain limits.
     """
 
     settings: Tolerances
     factors: tuple[str, ...]
     widest: WidestTolerances
-    demands: tuple[Demand, ...]
-    free: Mapping[str, tuple[float, float]]
+    demands: Sequence[KeptGain]
     grades: Mapping[str, Grade]
     relaxed: "PickTolerances | None" = None
 
@@ -189,12 +176,7 @@ class PickTolerances:
     @property
     def by_gain(self) -> dict[str, KeptGain]:
         """The demands by response."""
-        return {
-            demand.response: KeptGain(
-                demand.percent, demand.least, demand.least is not None, self.free.get(demand.response)
-            )
-            for demand in self.demands
-        }
+        return {demand.response: demand for demand in self.demands}
 
     @property
     def sentence(self) -> str:
@@ -202,9 +184,9 @@ class PickTolerances:
         if not self.any_width:
             return self.widest.sentence
         counted = [
-            f"{demand.words} {shown(demand.least, 2)} of {shown(demand.percent, 2)} %"
+            f"{demand.words} {shown(demand.at_least_percent, 2)} of {shown(demand.predicted_percent, 2)} %"
             for demand in self.demands
-            if demand.least is not None
+            if demand.counts
         ]
         kept = f"Gains that parts keep at least: {', '.join(counted)}." if counted else ""
         return " ".join(filter(None, [self.widest.sentence, kept, *self._rule_sentences(bool(counted))]))
@@ -212,36 +194,22 @@ class PickTolerances:
     def _rule_sentences(self, counted: bool) -> list[str]:
         """The gains that do not count with the reason, and where their responses lie among the parts."""
         settings = self.settings
-        free = [demand for demand in self.demands if demand.least is None]
-        gains = ", ".join(f"{demand.words} {improvement(demand.percent, None, demand.goal)}" for demand in free)
+        free = [demand for demand in self.demands if not demand.counts]
+        gains = ", ".join(
+            f"{demand.words} {improvement(demand.predicted_percent, None, demand.goal)}" for demand in free
+        )
         smallest = f"{ENOUGH:g} times the smallest difference that matters, {settings.smallest_difference_percent:g} %"
         if settings.gains is not None or settings.at_least:
             sentences = [f"[tolerances] does not name {gains}."] if free else []
-        elif any(demand.percent >= ENOUGH * settings.smallest_difference_percent for demand in self.demands):
+        elif any(demand.predicted_percent >= ENOUGH * settings.smallest_difference_percent for demand in self.demands):
             verb = "does" if len(free) == 1 else "do"
             sentences = [f"A gain counts from {smallest}; {gains} {verb} not."] if free else []
         else:
             sentences = [f"No gain reaches {smallest}, so all real gains count."] if counted else []
             sentences += [f"Not real: {gains}."] if free else []
-        if self.free:
-            sentences.append(f"In 95 % of these parts, compared with the baseline: {self._spread(self.free)}.")
+        if spread := ", ".join(_spread(demand) for demand in free if demand.parts_percent):
+            sentences.append(f"In 95 % of these parts, compared with the baseline: {spread}.")
         return sentences
-
-    def _spread(self, names: Collection[str]) -> str:
-        """'power loss 0.90 % more to 1.20 % less' of responses whose gains do not count."""
-        goals = {demand.response: demand.goal for demand in self.demands}
-        texts = []
-        for name in names:
-            low, high = (improvement(end, None, goals[name]) for end in self.free[name])
-            texts.append(f"{quantity(name)[0]} {low} to {high}")
-        return ", ".join(texts)
-
-    def _freed(self, name: str) -> str:
-        """'Then 95 % of the parts improve power loss by 0.90 to 1.20 %.' of a response whose gain does not count."""
-        low, high = self.free[name]
-        if low < 0.0:
-            return f"Then 95 % of the parts have {self._spread([name])}."
-        return f"Then 95 % of the parts improve {quantity(name)[0]} by {low:.2f} to {high:.2f} %."
 
     @property
     def warning(self) -> str:
@@ -256,7 +224,7 @@ class PickTolerances:
         if fine and self.relaxed is not None:
             wider, limit = self.relaxed._listed(fine), _limit_words(self.relaxed.widest.limited_by)
             sentences.append(f"Without this requirement the tolerance could be {wider}, limited by {limit}.")
-            sentences.append(self.relaxed._freed(self.limiting_gain))
+            sentences.append(_freed(self.relaxed.by_gain[self.limiting_gain]))
         elif fine:
             sentences.append("A design farther from this limit would allow wider tolerances.")
         if rim:
@@ -272,6 +240,19 @@ class PickTolerances:
         return ", ".join(
             f"{quantity(name)[0]} within ± {rounded_down(widths[name])} mm ({self.grades[name].name})" for name in names
         )
+
+
+def _spread(demand: KeptGain) -> str:
+    """'power loss 0.90 % more to 1.20 % less' of a gain that does not count."""
+    return f"{demand.words} {' to '.join(improvement(end, None, demand.goal) for end in demand.parts_percent or ())}"
+
+
+def _freed(demand: KeptGain) -> str:
+    """'Then 95 % of the parts improve power loss by 0.90 to 1.20 %.' of a gain that does not count."""
+    low, high = demand.parts_percent or ()
+    if low < 0.0:
+        return f"Then 95 % of the parts have {_spread(demand)}."
+    return f"Then 95 % of the parts improve {demand.words} by {low:.2f} to {high:.2f} %."
 
 
 def _limit_words(limit: str) -> str:
@@ -312,12 +293,13 @@ def widest_tolerances_of(
     demands = demands_of(study, settings, parts.percent, simulated)
     draws = search_draws or draws_of(study, confirmed)
     tolerances = parts.tolerances(demands, draws)
-    if not any(demand.least is not None for demand in demands) and not parts.goals.limited:
-        return replace(tolerances, widest=_none(tolerances.widest), free={}, grades={})
+    if not any(demand.counts for demand in demands) and not parts.goals.limited:
+        return replace(tolerances, widest=_none(tolerances.widest), demands=demands, grades={})
     gain = tolerances.limiting_gain
     if not gain or not tolerances.too_fine:
         return tolerances
-    relaxed = parts.tolerances([demand.let_go(gain) for demand in demands], None)
+    without = [replace(demand, at_least_percent=None) if demand.response == gain else demand for demand in demands]
+    relaxed = parts.tolerances(without, None)
     return replace(tolerances, relaxed=relaxed)
 
 
@@ -327,15 +309,16 @@ def _none(widest: WidestTolerances) -> WidestTolerances:
     return replace(widest, half_widths=np.full_like(widest.half_widths, np.nan), limited_by="", sentence=sentence)
 
 
-def _impossible(demands: Sequence[Demand]) -> str:
+def _impossible(demands: Sequence[KeptGain]) -> str:
     """The first gain that the pick itself does not have, in a sentence; empty if it has them all."""
     for demand in demands:
-        if demand.least is not None and demand.percent <= 0.0:
+        least, percent = demand.at_least_percent, demand.predicted_percent
+        if least is not None and percent <= 0.0:
             return f"No tolerance is possible: the selected design has no gain in {demand.words} to keep; leave it out of [tolerances]."
-        if demand.least is not None and demand.least > demand.percent:
+        if least is not None and least > percent:
             return (
-                f"No tolerance is possible: at_least.{demand.response} = {demand.least:g} exceeds the predicted gain of "
-                f"{shown(demand.percent, 3)} %; state less."
+                f"No tolerance is possible: at_least.{demand.response} = {least:g} exceeds the predicted gain of "
+                f"{shown(percent, 3)} %; state less."
             )
     return ""
 
@@ -362,22 +345,22 @@ class _PickParts:
         return np.flatnonzero(~self.study.rigid)
 
     @cached_property
-    def simulated_baseline(self) -> Array | None:
-        """Simulated responses (m,) of the baseline, if these count instead of the surfaces."""
-        return None if self.neighbours is None or not self.confirmed else self.confirmed["baseline"].values
-
-    @cached_property
     def ends(self) -> list[Array]:
-        """Predicted responses (1, m) at the baseline and at the pick."""
-        if self.neighbours is not None and self.simulated_baseline is not None:
-            return [self.simulated_baseline[None], self.neighbours.values]
+        """Responses (1, m) at the baseline and at the pick: simulated with neighbours, else predicted."""
+        if self.neighbours is not None and self.confirmed:
+            return [self.confirmed["baseline"].values[None], self.neighbours.values]
         places = (self.study.baseline, self.point)
         return [predict_all(self.study.surfaces, self.study.coded(place)[None]) for place in places]
 
     @cached_property
+    def reference(self) -> Array:
+        """Costs (1, q) of the baseline."""
+        return self.goals.costs(self.ends[0])
+
+    @cached_property
     def gain(self) -> Array:
         """Predicted gains (q,) in costs."""
-        return np.asarray((self.goals.costs(self.ends[0]) - self.goals.costs(self.ends[1]))[0])
+        return np.asarray((self.reference - self.goals.costs(self.ends[1]))[0])
 
     @cached_property
     def unit(self) -> Array:
@@ -394,13 +377,6 @@ class _PickParts:
     def _centre_values(self) -> Array:
         return predict_all(self.study.surfaces, self.study.coded(self.point)[None])
 
-    @cached_property
-    def _reference(self) -> Array:
-        """Costs (1, q) of the baseline."""
-        if self.simulated_baseline is not None:
-            return self.goals.costs(self.simulated_baseline[None])
-        return self.goals.costs(predict_all(self.study.surfaces, self.study.coded(self.study.baseline)[None]))
-
     def _costs(self, parts: Array) -> Array:
         """Costs and violations (samples, q + c) of parts (samples, f), values of the factors that have a tolerance."""
         points = np.tile(self.point, (len(parts), 1))
@@ -411,19 +387,18 @@ class _PickParts:
             values = values - self._centre_values + here.values + (coded - here.points) @ here.slopes[0]
         return np.hstack([self.goals.costs(values), self.goals.violations(values, values)])
 
-    def tolerances(self, demands: Sequence[Demand], draws: Draws | None) -> PickTolerances:
+    def tolerances(self, demands: Sequence[KeptGain], draws: Draws | None) -> PickTolerances:
         """The widest tolerances that keep the demands; with ``draws``, the interval has the errors of the surfaces."""
         widest = self._widest(demands, draws)
         grades = {} if self.scene is None else grades_of(self.study, self.scene, self.point, widest.half_widths)
-        free = self._free_gains(demands, widest)
-        return PickTolerances(self.settings, tuple(self.study.factors), widest, tuple(demands), free, grades)
+        demands = self._with_ranges(demands, widest)
+        return PickTolerances(self.settings, tuple(self.study.factors), widest, demands, grades)
 
-    def _widest(self, demands: Sequence[Demand], draws: Draws | None) -> WidestTolerances:
+    def _widest(self, demands: Sequence[KeptGain], draws: Draws | None) -> WidestTolerances:
         study, settings, free = self.study, self.settings, self.free_factors
-        least = np.array([-np.inf if demand.least is None else demand.least for demand in demands]) * np.maximum(
-            self.unit, 1e-300
-        )
-        share = np.array([demand.least is not None and demand.response not in settings.at_least for demand in demands])
+        percent = [-np.inf if demand.at_least_percent is None else demand.at_least_percent for demand in demands]
+        least = np.array(percent) * np.maximum(self.unit, 1e-300)
+        share = np.array([demand.counts and demand.response not in settings.at_least for demand in demands])
         least[share] = settings.keep * self.gain[share]
         slack = 1e-9 * np.abs(self.gain).max()
         no_violations = np.zeros((1, len(self.goals.limited)))
@@ -434,7 +409,7 @@ class _PickParts:
         tolerances = widest_tolerances(
             self._costs,
             self.point[free],
-            np.hstack([self._reference - least, no_violations]) + slack,
+            np.hstack([self.reference - least, no_violations]) + slack,
             (study.step if np.isnan(ratios[free]).any() else ratios)[free],
             lower=low[free],
             upper=high[free],
@@ -446,9 +421,9 @@ class _PickParts:
         )
         return replace(tolerances, sentence=_impossible(demands) or tolerances.sentence).among(free, self.point.size)
 
-    def _promise(self, demands: Sequence[Demand]) -> str:
+    def _promise(self, demands: Sequence[KeptGain]) -> str:
         """What parts keep, in words."""
-        counted = any(demand.least is not None for demand in demands)
+        counted = any(demand.counts for demand in demands)
         return " and ".join([*["keep the gains that count"] * counted, *["meet all limits"] * bool(self.goals.limited)])
 
     @property
@@ -458,18 +433,17 @@ class _PickParts:
         names = [f"{GAIN}{responses[index]}" for index in self.goals.objectives]
         return [*names, *(f"{responses[index]} {sense} {limit:g}" for index, sense, limit in self.goals.limited)]
 
-    def _free_gains(self, demands: Sequence[Demand], widest: WidestTolerances) -> dict[str, tuple[float, float]]:
-        """Ends [%] of the gains of 95 % of the parts, by response whose gain does not count."""
+    def _with_ranges(self, demands: Sequence[KeptGain], widest: WidestTolerances) -> list[KeptGain]:
+        """The demands with the ends [%] of the gains of 95 % of the parts, where these do not count."""
         half = np.nan_to_num(widest.half_widths[self.free_factors])
         settings = self.settings
         offsets = random_offsets(settings.samples, half.size, settings.distribution, settings.seed)
         costs = self._costs(self.point[self.free_factors] + half * offsets)
-        ends = np.quantile(self._reference - costs[:, : len(demands)], MIDDLE, axis=0) / np.maximum(self.unit, 1e-300)
-        return {
-            demand.response: (float(low), float(high))
-            for demand, low, high in zip(demands, *ends, strict=True)
-            if demand.least is None
-        }
+        ends = np.quantile(self.reference - costs[:, : len(demands)], MIDDLE, axis=0) / np.maximum(self.unit, 1e-300)
+        return [
+            demand if demand.counts else replace(demand, parts_percent=tuple(range_of_parts))
+            for demand, range_of_parts in zip(demands, ends.T.tolist(), strict=True)
+        ]
 
 
 def _box(study: Problem, point: Array, extent: Array | None) -> tuple[Array, Array]:

@@ -29,8 +29,8 @@ from doe.unknown.decision import GainChances
 from doe.unknown.propagation import Share
 from doe.workflow.confirmation import Gain
 from doe.workflow.judgement import ConfirmedGain, Robust, RobustFront
-from doe.workflow.pick import BeyondBound, Outward
-from doe.workflow.runs import read_runs
+from doe.workflow.pick import Outward
+from doe.workflow.runs import EstimatedValue, read_runs
 from doe.workflow.surfaces import fit_surfaces
 from rbdyn.base.words import label, quantity, rounded_down, shown, with_error
 from rbdyn.plots.roller import cage_orbit
@@ -310,7 +310,7 @@ def test_error_bars_end_at_the_frame():
 
 def test_beyond_the_edge_each_response_has_direction_and_unit():
     figures = {"impact_force_N": (0.2, 0.4), "power_loss_W": (-0.5, 0.1), "cage_speed_rpm": (3.0, 1.0)}
-    gains = {name: BeyondBound(*figure) for name, figure in figures.items()}
+    gains = {name: EstimatedValue(*figure) for name, figure in figures.items()}
     outward = Outward("upper", 0.25, "µm", "simulation", gains)
     told = outward.sentence("guide_clearance_mm", {"cage_speed_rpm": "max"})
     assert (
