@@ -235,6 +235,7 @@ def _solved(search: Allocation, samples: int, seed: int) -> ChainResult:
     mean, deviation = float(assemblies.values.mean()), float(assemblies.values.std())
     nearer = min(limits.upper_mm - mean, mean - limits.lower_mm)
     varies = deviation > SLACK
+    percent, sizes = _contributions(function, parts)
     verdict = _verdict(search, judged, partial(_accepted, samples=samples, seed=seed))
     return ChainResult(
         nominal_mm=round(float(function.value({part.name: part.nominal_mm for part in parts})), DIGITS),
@@ -242,7 +243,7 @@ def _solved(search: Allocation, samples: int, seed: int) -> ChainResult:
         rss_mm=interval(function, parts, "rss"),
         yields=assemblies.yields,
         standard_errors={law: standard_error(share, samples) for law, share in assemblies.yields.items()},
-        contributions=_contributions(function, parts),
+        contributions=percent,
         allocated={part.name: _allocated(part) for part in verdict.nearest or parts},
         sizes={part.name: _size(part) for part in parts},
         allocation=tuple(verdict.nearest or parts),
@@ -263,7 +264,7 @@ def _solved(search: Allocation, samples: int, seed: int) -> ChainResult:
         parts=tuple(parts),
         limits_mm=(limits.lower_mm, limits.upper_mm),
         resolution_mm=chain.allocate.resolution_mm,
-        contributions_mm=_contributions_mm(function, parts),
+        contributions_mm=sizes,
         missed=verdict.missed,
         remedy=verdict.remedy,
     )
@@ -348,28 +349,24 @@ def _allocated_status(chain: Chain) -> str:
     return "ok: deviations allocated"
 
 
-def _contributions_mm(function: ClosingFunction, parts: Sequence[Part]) -> dict[str, dict[str, float]]:
-    """What each part takes of the closing link, mm: of its worst case, and of six standard deviations."""
-    slopes = function.sensitivities(middle(parts))
-    return {
-        part.name: {
-            "worst_case_mm": abs(slopes[part.name]) * part.tolerance_mm,
-            "six_sigma_mm": 6 * abs(slopes[part.name]) * sqrt(moments(part, part.distribution)[1]),
-        }
-        for part in parts
-    }
+def _contributions(
+    function: ClosingFunction, parts: Sequence[Part]
+) -> tuple[dict[str, dict[str, float]], dict[str, dict[str, float]]]:
+    """What each part takes of the closing link's scatter, in percent and in mm; sensitivities at the middle.
 
-
-def _contributions(function: ClosingFunction, parts: Sequence[Part]) -> dict[str, dict[str, float]]:
-    """Percent of the variance, by each part's own distribution, and of the worst case; sensitivities at the middle."""
-    slopes = function.sensitivities(middle(parts))
-    spread = [slopes[part.name] ** 2 * moments(part, part.distribution)[1] for part in parts]
+    In percent of the variance, by each part's own distribution, and of the worst case; in mm of the worst case and of six standard
+    deviations.
+    """
+    slopes, percent, sizes = function.sensitivities(middle(parts)), {}, {}
+    variances = [moments(part, part.distribution)[1] for part in parts]
+    spread = [slopes[part.name] ** 2 * variance for part, variance in zip(parts, variances, strict=True)]
     reach = [abs(slopes[part.name]) * part.tolerance_mm for part in parts]
-    shares = ([100 * value / (sum(column) or 1.0) for value in column] for column in (spread, reach))
-    return {
-        part.name: {"variance_percent": variance, "worst_case_percent": width}
-        for part, variance, width in zip(parts, *shares, strict=True)
-    }
+    whole = [sum(column) or 1.0 for column in (spread, reach)]
+    for part, variance, scatter, width in zip(parts, variances, spread, reach, strict=True):
+        shares = {"variance_percent": 100 * scatter / whole[0], "worst_case_percent": 100 * width / whole[1]}
+        six_sigma = 6 * abs(slopes[part.name]) * sqrt(variance)
+        percent[part.name], sizes[part.name] = shares, {"worst_case_mm": width, "six_sigma_mm": six_sigma}
+    return percent, sizes
 
 
 def _exact(search: Allocation, parts: Sequence[Part]) -> dict[str, float] | None:

@@ -49,20 +49,17 @@ def tables() -> dict[str, list[Sheet[Any]]]:
         RUNS,
         Sheet("", front, file="front.csv", content="One row per point of the front."),
         confirmation_sheet(factors),
-        Sheet("", DUTY_POINTS, file="duty_points.csv", content="One row per response at each point of a duty."),
+        DUTY_POINTS,
         part_sheet({}),
         chain_shares({}),
         reference_sheet(factors, responses),
     ]
-    deciders = Sheet(
-        "", DECIDERS, file="decides.csv", content="The inputs that decide between the selected design and the baseline."
-    )
     unknown = [
         set_sheet(["{key}"], responses),
         range_sheet(()),
         share_sheet(()),
         input_sheet(()),
-        deciders,
+        DECIDERS,
         cell_sheet(()),
     ]
     return {"Tables of a study": study, "Tables of unknown inputs": unknown}

@@ -395,17 +395,9 @@ def survival(study: Problem, draws: Draws, coded: Array, box: ToleranceBox) -> I
 
 def open_errors(surfaces: Sequence[Surface], searched: bool = False) -> str:
     """The errors that the interval of a share of parts holds, and those that it leaves out, in a sentence."""
-    if searched:
-        return (
-            "The interval includes the errors of the search and the count of the parts; numerical errors and the scene's "
-            "inputs count as exact."
-        )
-    if all(surface.model_error for surface in surfaces):
-        return (
-            "The interval includes the errors of the surfaces and the count of the parts; numerical errors and the scene's "
-            "inputs count as exact."
-        )
+    source = "search" if searched else "surfaces"
+    form = "" if searched or all(surface.model_error for surface in surfaces) else "the form of the surfaces, "
     return (
-        "The interval includes the errors of the surfaces and the count of the parts; the form of the surfaces, numerical "
-        "errors and the scene's inputs count as exact."
+        f"The interval includes the errors of the {source} and the count of the parts; {form}numerical errors and the scene's "
+        "inputs count as exact."
     )

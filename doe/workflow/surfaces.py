@@ -488,9 +488,8 @@ class PredictedGain(Record):
         if self.scatter is None:
             return f"{change}, {verdict}."
         scatter = f"{error_alone(self.scatter)} %"
-        if self.within_scatter:
-            return f"{change}, {verdict} and inside the scatter of single runs ({scatter})."
-        return f"{change}, {verdict} and outside the scatter of single runs ({scatter})."
+        side = "inside" if self.within_scatter else "outside"
+        return f"{change}, {verdict} and {side} the scatter of single runs ({scatter})."
 
 
 def predicted_gains(study: Problem, point: Array) -> list[PredictedGain]:

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -273,7 +274,7 @@ class DutyFigure(NamedTuple):
         return cls(point, response, limit, *ends, point.gains.get(response), cost)
 
 
-DUTY_POINTS: tuple[Column[DutyFigure], ...] = (
+DUTY_COLUMNS: tuple[Column[DutyFigure], ...] = (
     Column("point", at=("point", "name"), meaning="point of operation, and its share of the time"),
     Column("share", at=("point", "share"), screen=False, meaning="point of operation, and its share of the time"),
     Column(
@@ -328,6 +329,10 @@ DUTY_POINTS: tuple[Column[DutyFigure], ...] = (
         meaning="verdict on the limit of the response at the point",
     ),
 )
+DUTY_POINTS = Sheet(
+    "Simulated results at every point (95 % intervals)", DUTY_COLUMNS, detail=Detail.ALL, file="duty_points.csv",
+    content="One row per response at each point of a duty.",
+)  # fmt: skip
 
 
 def duty_figures(summary: Summary) -> Sheet[DutyFigure]:
@@ -338,9 +343,7 @@ def duty_figures(summary: Summary) -> Sheet[DutyFigure]:
         for name in summary.asked.names
         if name in point.pick
     ]
-    caption = "Simulated results at every point (95 % intervals)"
-    content = "One row per response at each point of a duty."
-    return Sheet(caption, DUTY_POINTS, rows, detail=Detail.ALL, file="duty_points.csv", content=content)
+    return replace(DUTY_POINTS, rows=rows)
 
 
 def in_operation(summary: Summary, factor: Factor, end: str) -> tuple[float | None, str]:

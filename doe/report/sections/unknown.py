@@ -2,6 +2,7 @@
 
 import csv
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -211,7 +212,7 @@ def draw_uncertainty(uncertainty: Uncertainty, path: Path) -> None:
     save(figure, path)
 
 
-DECIDERS: tuple[Column[Decider], ...] = (
+DECIDER_COLUMNS: tuple[Column[Decider], ...] = (
     Column("input", at="key", meaning="key of the input"),
     Column(
         "worth",
@@ -238,6 +239,10 @@ DECIDERS: tuple[Column[Decider], ...] = (
         meaning="whether the selected design is better above the flip",
     ),
 )
+DECIDERS = Sheet(
+    "Inputs that decide", DECIDER_COLUMNS, note="Points: by how much of 100 the chance of the right choice rises.",
+    file="decides.csv", content="The inputs that decide between the selected design and the baseline.",
+)  # fmt: skip
 
 
 def robustness(summary: Summary, motion: Mapping[str, Any]) -> Section | None:
@@ -281,9 +286,7 @@ def _limits(summary: Summary) -> Table:
 
 def decider_sheet(robust: Robust) -> Sheet[Decider]:
     """By input: what measuring it is worth, and the value at which the choice flips."""
-    note = "Points: by how much of 100 the chance of the right choice rises."
-    content = "The inputs that decide between the selected design and the baseline, by worth."
-    return Sheet("Inputs that decide", DECIDERS, robust.decides, note, file="decides.csv", content=content)
+    return replace(DECIDERS, rows=robust.decides)
 
 
 def robust_input_sheet(robust: Robust) -> Sheet[UnknownInput]:
