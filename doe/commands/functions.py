@@ -2,7 +2,7 @@
 
 import sys
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import ExitStack, contextmanager
+from contextlib import AbstractContextManager, ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -77,13 +77,11 @@ Verbose = Annotated[
 ]
 
 
-@contextmanager
-def keeping_runs(out: Path | None) -> Iterator[None]:
+def keeping_runs(out: Path | None) -> AbstractContextManager[None]:
     """On Ctrl-C a sentence says that the store in ``out`` keeps the finished runs."""
     from doe.running.store import STORE
 
-    with checkpoint_message(None if out is None else out / STORE):
-        yield
+    return checkpoint_message(None if out is None else out / STORE)
 
 
 @contextmanager

@@ -5,7 +5,7 @@ import re
 import shutil
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -187,14 +187,9 @@ def part_given(text: Any) -> tuple[int, int] | None:
     return part, parts
 
 
-@contextmanager
-def registered(source: Path, folder: Path | None) -> Iterator[None]:
+def registered(source: Path, folder: Path | None) -> AbstractContextManager[None]:
     """Register that the file ``source`` runs in a folder, for ``doe status``; nothing without a folder."""
-    if folder is None:
-        yield
-        return
-    with at_work(source, folder / STORE):
-        yield
+    return nullcontext() if folder is None else at_work(source, folder / STORE)
 
 
 def step_folder(

@@ -2,7 +2,7 @@
 
 import tempfile
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -46,7 +46,6 @@ class Effort(NamedTuple):
 
         return threads_of(self.workers)
 
-    @contextmanager
     def agenda(
         self,
         folder: Path,
@@ -54,13 +53,12 @@ class Effort(NamedTuple):
         options: Mapping[str, bool] | None = None,
         inputs: str = "",
         question: str = "",
-    ) -> Iterator[AgendaKeeper]:
+    ) -> AbstractContextManager[AgendaKeeper]:
         """The agenda of a command in the store of its folder, for ``doe status``.
 
         ``inputs``: digest of the inputs of its answer; ``question``: digest of all that decides its runs.
         """
-        with agenda_in(folder / STORE, command, self.threads, options, inputs, self.notice, question) as agenda:
-            yield agenda
+        return agenda_in(folder / STORE, command, self.threads, options, inputs, self.notice, question)
 
     @contextmanager
     def simulations(self, folder: Path, source: Path, agenda: AgendaKeeper | None = None) -> "Iterator[Simulations]":
