@@ -13,11 +13,11 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import islice
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, overload
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from doe.duty import DutyResult, Run, labelled_scenes, result_of
+from doe.duty import Run, Simulated, labelled_scenes, result_of
 from doe.running.runner import AgendaKeeper, Engine, Ledger, Progress, RunOutcome, RunResult, run_points
 from doe.running.store import STORE, Failure, Point, Store
 from rbdyn.base.arrays import Array, Whole
@@ -85,31 +85,13 @@ class Simulations:
         """Shaft turns of all requested runs, whether simulated now or stored before."""
         return sum(self.turns_of.values())
 
-    @overload
-    def run(
-        self,
-        runs: Sequence[Scene],
-        labels: Sequence[str],
-        progress: Progress,
-        factors: Sequence[Mapping[str, float]] | None = None,
-    ) -> list[SimulationResult | Failure]: ...
-
-    @overload
     def run(
         self,
         runs: Sequence[Run],
         labels: Sequence[str],
         progress: Progress,
         factors: Sequence[Mapping[str, float]] | None = None,
-    ) -> list[SimulationResult | DutyResult | Failure]: ...
-
-    def run(
-        self,
-        runs: Sequence[Run],
-        labels: Sequence[str],
-        progress: Progress,
-        factors: Sequence[Mapping[str, float]] | None = None,
-    ) -> list[Any]:
+    ) -> list[Simulated | Failure]:
         """Results or failures of runs, in their order, from the store or simulated. A run fails where any of its points fails.
 
         ``factors``: those of design runs, which are then numbered. Raises RunError if the store cannot be written, InputError
@@ -134,7 +116,7 @@ class Simulations:
         return _by_run(runs, labels, points, results)
 
 
-def stored(folder: Path, runs: Sequence[Run], labels: Sequence[str]) -> list[Any] | None:
+def stored(folder: Path, runs: Sequence[Run], labels: Sequence[str]) -> list[Simulated | Failure] | None:
     """Results or failures of runs in the store of a folder; None unless all of them have ended. Nothing is simulated."""
     if not (folder / STORE).exists():
         return None
@@ -148,7 +130,7 @@ def stored(folder: Path, runs: Sequence[Run], labels: Sequence[str]) -> list[Any
 
 def _by_run(
     runs: Sequence[Run], labels: Sequence[str], points: Sequence[Point], results: Sequence[SimulationResult | Failure]
-) -> list[Any]:
+) -> list[Simulated | Failure]:
     """Results of runs from those of all their points."""
     rest = zip(points, results, strict=True)
     return [
@@ -297,7 +279,7 @@ def attempt_text(text: str, version: str) -> RunOutcome:
     return replace(attempt(Scene.from_dict(json.loads(text))), host=host, pid=pid)
 
 
-def figures(names: Sequence[str], results: Sequence[SimulationResult | DutyResult]) -> tuple[Array, Array, Whole]:
+def figures(names: Sequence[str], results: Sequence[Simulated]) -> tuple[Array, Array, Whole]:
     """Values, 95 % statistical half-widths (NaN if unknown) and numbers of independent values (0: unknown) of results.
 
     Each has the shape (runs, responses). The value of a response that a run does not report is NaN.

@@ -23,7 +23,7 @@ from rbdyn.base.faults import RunError
 from rbdyn.base.notes import DANGER, Note, Notes, condensed, of_level
 from rbdyn.base.records import Record, derived, finite, keyed, outside_json, spread
 from rbdyn.base.words import chance, decimals, improvement, quantity, with_error
-from rbdyn.result import TEMPERATURES, Quantity, SimulationResult, arrays_of
+from rbdyn.result import TEMPERATURES, Quantity, arrays_of
 from rbdyn.scene import Scene
 from rbdyn.scene.thermal import simulated_scene
 from rbdyn.verdict.replicates import CageVerdict
@@ -186,7 +186,7 @@ def _in_proportion(known: Confirmed, found: Confirmed) -> Array:
     return known.numerical * np.abs(shares)
 
 
-def confirmed_from(study: Problem, choice: Choice, result: SimulationResult | DutyResult) -> Confirmed:
+def confirmed_from(study: Problem, choice: Choice, result: Simulated) -> Confirmed:
     """The study's responses of a simulation at a chosen point."""
     responses = result.responses
     values, statistical, numerical, freedom = arrays_of([responses.get(name) for name in study.responses])

@@ -20,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 from doe import clearance
-from doe.duty import DutyResult
+from doe.duty import Simulated
 from doe.pareto import Goals, ParetoFront
 from doe.running.runner import Progress
 from doe.running.store import Failure
@@ -48,7 +48,6 @@ from rbdyn.base.faults import InputError
 from rbdyn.base.notes import Note, Notes
 from rbdyn.base.records import Record, derived, finite
 from rbdyn.base.words import Notice, counted, improvement, quantity, shown, with_error
-from rbdyn.result import SimulationResult
 
 # Steps beyond a bound, up to half the width of the region again, at which the surfaces are asked.
 STEPS = 20
@@ -275,9 +274,6 @@ def _least_move(study: Problem, pick: Confirmed, sides: Array, places: list[int]
     return None
 
 
-Outcome = SimulationResult | DutyResult | Failure
-
-
 def original_sentences(study: Problem, baseline: Confirmed) -> list[str]:
     """Figures of the original at each point of the duty, and the limits that it misses."""
     responses = zip(study.responses, baseline.values.tolist(), baseline.error.tolist(), strict=True)
@@ -329,7 +325,9 @@ def first_look(study: Problem, folder: Path, original: Confirmed, progress: Prog
     return watch
 
 
-def unlikely(study: Problem, missed: Sequence[Limit], coded: Array, results: Sequence[Outcome]) -> list[str]:
+def unlikely(
+    study: Problem, missed: Sequence[Limit], coded: Array, results: Sequence[Simulated | Failure]
+) -> list[str]:
     """Sentences on the limits that the original and all corners miss, and a plane through these too.
 
     ``results`` (n) at ``coded`` corners (n, k); failed ones are left out. The plane is followed to the bounds of the search; it

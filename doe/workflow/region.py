@@ -17,6 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from doe import clearance
+from doe.duty import Simulated
 from doe.running.store import Failure
 from doe.study_file.sections import Factor
 from doe.workflow.effort import Effort
@@ -54,7 +55,7 @@ HOTTER_K = 10.0
 MOST_LOOKS = 8
 
 # Results of short runs of scenes with these labels.
-Balances = Callable[[Sequence[Scene], Sequence[str]], Sequence[SimulationResult | Failure]]
+Balances = Callable[[Sequence[Scene], Sequence[str]], Sequence[Simulated | Failure]]
 # Temperatures of the parts that were found, by point of the duty, "" without one.
 Heat = Mapping[str, Sequence[Temperatures]]
 
@@ -116,7 +117,7 @@ def region_that_runs(study: Problem, folder: Path, effort: Effort, kept: float =
     """
     notice = effort.notice
 
-    def balance(scenes: Sequence[Scene], labels: Sequence[str]) -> Sequence[SimulationResult | Failure]:
+    def balance(scenes: Sequence[Scene], labels: Sequence[str]) -> Sequence[Simulated | Failure]:
         if notice is not None:
             notice(f"{counted(len(scenes), 'short run')} for the temperatures of {labels[0].partition(' at ')[0]}")
         with effort.simulations(folder, study.path) as simulations:
@@ -136,7 +137,7 @@ class _UnknownError(Exception):
 def region_in_store(study: Problem, folder: Path) -> Problem:
     """The study with the region that runs, if the runs in the store of ``folder`` tell; nothing is simulated."""
 
-    def balance(scenes: Sequence[Scene], labels: Sequence[str]) -> Sequence[SimulationResult | Failure]:
+    def balance(scenes: Sequence[Scene], labels: Sequence[str]) -> Sequence[Simulated | Failure]:
         if (results := clearance.stored(folder, scenes, labels)) is None:
             raise _UnknownError
         return results
@@ -231,7 +232,7 @@ def _balanced(
             found[name] = Temperatures(*(nodes[node].value for node in Temperatures._fields))
             if near is not None and (balanced := near_of(result)) is not None:
                 near[name] = balanced
-        elif not result.cause.startswith("undecided"):
+        elif isinstance(result, Failure) and not result.cause.startswith("undecided"):
             found[name] = result.cause
     return found
 

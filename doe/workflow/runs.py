@@ -14,7 +14,7 @@ from doe.designs import Design
 from doe.designs.design import SAME_POINT
 from doe.designs.model import Evaluation, lattice, lost_terms
 from doe.designs.optimal import Remaining, added_points
-from doe.duty import DutyResult, Simulated, cages_of
+from doe.duty import Simulated, cages_of
 from doe.running.runner import Progress
 from doe.running.store import Cause, Failure, alike, grouped, sentence
 from doe.study_file.sections import at_point
@@ -26,7 +26,6 @@ from rbdyn.base.faults import RunError
 from rbdyn.base.notes import DANGER, Note, Notes
 from rbdyn.base.records import Record, finite
 from rbdyn.base.words import are, counted, with_error
-from rbdyn.result import SimulationResult
 
 # Times that failed runs are replaced: the last ones may fail too.
 REPLACED = 3
@@ -148,9 +147,7 @@ def _lacking(study: Problem, design: Design, rows: list[int]) -> str:
     return f", which cannot separate {', '.join(lost)} from the other terms of the response models" if lost else ""
 
 
-def _with_replacements(
-    study: Problem, ordered: RunPlan, results: Sequence[SimulationResult | DutyResult | Failure]
-) -> RunPlan | None:
+def _with_replacements(study: Problem, ordered: RunPlan, results: Sequence[Simulated | Failure]) -> RunPlan | None:
     """The plan with another run for each that failed, in what remains of the region; None where the models need none, or none is left."""
     failed = np.array([isinstance(result, Failure) for result in results])
     design, rows = ordered.design, np.flatnonzero(~failed)

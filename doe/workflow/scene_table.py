@@ -299,4 +299,4 @@ def _batch(
             figures = RowFigures(names.setdefault(keys, keys), arrays_of([*result.responses.values()])[:3])
             yield RowRun(row, figures)
         else:
-            yield RowRun(row, None, faults[row.number] if result is None else result.cause)
+            yield RowRun(row, None, result.cause if isinstance(result, Failure) else faults[row.number])

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from doe.clearance import Simulations, responses_of, work_of
+from doe.duty import Simulated
 from doe.running.runner import ANSWER, Stage
 from doe.running.store import Failure
 from doe.unknown.propagation import (
@@ -38,7 +39,7 @@ from rbdyn.base.notes import Note, Notes
 from rbdyn.base.records import Record, derived, outside_json, spread
 from rbdyn.base.words import NORMAL, are, counted
 from rbdyn.dynamics.figures import FIGURES, of_kind, why_missing
-from rbdyn.result import TEMPERATURES, Quantity, SimulationResult
+from rbdyn.result import TEMPERATURES, Quantity
 from rbdyn.scene.unknown import UnknownInput
 
 # Outputs of every scene; those with a heat balance also have their temperatures, those with a start its least clearances.
@@ -202,14 +203,14 @@ def _idle_notes(idle: Mapping[str, float]) -> list[Note]:
     ]
 
 
-def _emulated(case: Case, sets: Sets, nominal: SimulationResult, place: int) -> tuple[Runs, Emulated]:
+def _emulated(case: Case, sets: Sets, nominal: Simulated, place: int) -> tuple[Runs, Emulated]:
     numerical = nominal.responses[case.outputs[place]].numerical_error or 0.0
     runs = Runs(sets.quantiles, *sets.outputs.at((slice(None), place)), (numerical / NORMAL) ** 2)
     return runs, emulated(runs, case.uncertain.inputs, declared(case))
 
 
 def _output(
-    case: Case, nominal: SimulationResult, name: str, interval: Range, runs: Runs, fitted: Emulated, fresh_sets: Array
+    case: Case, nominal: Simulated, name: str, interval: Range, runs: Runs, fitted: Emulated, fresh_sets: Array
 ) -> OutputRange:
     inputs, seed = [case.every[place] for place in fitted.columns[:-1]], case.uncertain.seed
     by_key = dict[str, dict[str, Share] | None](first=None, total=None, shapley=None)

@@ -18,7 +18,7 @@ from doe.designs import Design
 from doe.dimension_chain import Chain, ChainResult, chain_from, solve
 from doe.dimension_chain.allocation import Allocation
 from doe.dimension_chain.refusal import allocated_reason
-from doe.duty import OPERATION, Duty, DutyResult, scene_at
+from doe.duty import OPERATION, Duty, Simulated, scene_at
 from doe.pareto import ParetoFront
 from doe.running.queue import Part, rows_of
 from doe.running.runner import ANSWER, AgendaKeeper, Stage
@@ -60,7 +60,6 @@ from rbdyn.base.records import Record
 from rbdyn.clearances import REPORTED
 from rbdyn.life.duty import life_notes
 from rbdyn.properties.catalogue import classes_at
-from rbdyn.result import SimulationResult
 from rbdyn.scene import Scene
 from rbdyn.scene.notes import catalogue_entry
 
@@ -515,7 +514,7 @@ class _Clock:
 
 def run_part(
     study: Problem, folder: Path, effort: Effort, part: Part, agenda: AgendaKeeper
-) -> list[SimulationResult | DutyResult | Failure]:
+) -> list[Simulated | Failure]:
     """Simulate the design runs of a part of a study, with their store in ``folder``. Raises as ``run_study``."""
     study, _ = region_that_runs(study, folder, effort)
     check_study(study)
