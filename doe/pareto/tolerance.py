@@ -1,6 +1,6 @@
 """The widest tolerances of a pick within which parts keep its gains, and the tolerances of a simulated front.
 
-``widest_tolerances`` widens the tolerances about a pick until the share of parts that keep all limits is at its target.
+``Parts.widest`` widens the tolerances about a pick until the share of parts that keep all limits is at its target.
 
 A simulated front has no surface for parts about its points. ``simulated_aware`` takes their shape from surfaces. A local
 linear fit of the surfaces' errors at nearby runs corrects it (Cleveland, Robust locally weighted regression, 1979). The level is that of the fresh runs at the point. Parts may be outside the bounds of the search by the
@@ -9,11 +9,11 @@ tolerance, where the same shape applies.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import product
 from typing import Self
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from doe.pareto.manufacture import (
     SURVIVAL_PARTS,
@@ -65,82 +65,73 @@ class WidestTolerances:
         return replace(self, half_widths=half, at_rim=rim)
 
 
-def widest_tolerances(
-    objectives: Costs,
-    pick: ArrayLike,
-    limits: ArrayLike,
-    ratios: ArrayLike,
-    *,
-    lower: ArrayLike,
-    upper: ArrayLike,
-    names: Sequence[str],
-    probability: float = 0.95,
-    distribution: Distribution = "normal",
-    samples: int = 4096,
-    seed: int = 1,
-    promise: str = "meet all limits",
-    count_on_draws: PartCount | None = None,
-    open_errors: str = "",
-) -> WidestTolerances:
-    """The widest tolerances within which a part keeps all limits with a stated probability.
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Parts:
+    """Parts about a nominal point ``centre`` (k,), which keep all limits with a stated ``probability``.
 
     objectives : maps points (samples, k) to costs (samples, c).
-    pick : the nominal point (k,).
-    limits : largest permitted costs (c,).
-    ratios : half widths (k,) relative to each other; all are widened together.
+    limits, names : largest permitted costs (c,), and their names for the result.
     lower, upper : bounds (k,) of the region, which no half width exceeds, for no surface is valid beyond.
-    names : of the limits (c,), for the result.
-    probability : share of the parts that must keep all limits.
     distribution : of the parts within the tolerance, see `doe.pareto.manufacture.offsets`.
     samples, seed : of the random parts, the same for every width (common random numbers).
     promise : the condition on the parts in words, for the sentence.
     count_on_draws : number of parts that keep all limits on each draw of the surfaces or emulators, for the interval. By
         default the interval has only the error of the random parts.
     open_errors : sentence on the errors that the interval includes and excludes.
-
-    The search goes from the pick outwards up to the first loss, so all narrower tolerances keep the limits too. Where even
-    the exact pick breaks a limit, all widths are zero.
-
-    Raises MethodError when a ratio is not positive, a probability is not in (0, 1), or the pick is outside the region.
     """
-    centre, share = np.asarray(pick, float), np.asarray(ratios, float)
-    low, high = np.asarray(lower, float), np.asarray(upper, float)
-    room = np.minimum(centre - low, high - centre)
-    if (share <= 0.0).any() or not 0.0 < probability < 1.0:
-        raise MethodError(f"ratios = {share.tolist()}, probability = {probability}: must be positive and in (0, 1)")
-    if (room < -1e-9 * (high - low)).any():
-        raise MethodError(f"pick = {centre.tolist()}: is outside the region; choose a point within it")
-    offsets = random_offsets(samples, centre.size, distribution, seed)
-    texts = promise, open_errors
-    limit = np.asarray(limits, float)
-    parts = _Parts(objectives, centre, limit, room.clip(0.0), offsets, names, probability, texts, count_on_draws)
-    exact = np.zeros(centre.size)
-    if parts.share(exact) < probability:
-        worst = parts.most_broken(exact)
-        return parts.nothing(
-            worst, f"even the exact selected design keeps {worst} with a probability below the required {parts.percent}"
-        )
-    return _result(parts, parts.largest_scale(share), share)
-
-
-@dataclass(frozen=True, eq=False)
-class _Parts:
-    """Parts about a point, and the ``target`` share that must keep the limits of these names."""
 
     objectives: Costs
     centre: Array
     limits: Array
-    room: Array
-    offsets: Array
+    lower: Array
+    upper: Array
     names: Sequence[str]
-    target: float
-    texts: tuple[str, str]
-    count_on_draws: PartCount | None
+    probability: float = 0.95
+    distribution: Distribution = "normal"
+    samples: int = 4096
+    seed: int = 1
+    promise: str = "meet all limits"
+    count_on_draws: PartCount | None = None
+    open_errors: str = ""
+
+    def widest(self, ratios: Array) -> WidestTolerances:
+        """The widest tolerances within which a part keeps all limits, widened together in the ``ratios`` (k,) of their half widths.
+
+        The search goes from the centre outwards up to the first loss, so all narrower tolerances keep the limits too. Where even
+        the exact centre breaks a limit, all widths are zero.
+
+        Raises MethodError when a ratio is not positive, the probability is not in (0, 1), or the centre is outside the region.
+        """
+        if (ratios <= 0.0).any() or not 0.0 < self.probability < 1.0:
+            raise MethodError(
+                f"ratios = {ratios.tolist()}, probability = {self.probability}: must be positive and in (0, 1)"
+            )
+        slack = 1e-9 * (self.upper - self.lower)
+        if ((self.centre < self.lower - slack) | (self.centre > self.upper + slack)).any():
+            raise MethodError(f"pick = {self.centre.tolist()}: is outside the region; choose a point within it")
+        exact = np.zeros(self.centre.size)
+        if self.share(exact) < self.probability:
+            worst = self.most_broken(exact)
+            return self.nothing(
+                worst,
+                f"even the exact selected design keeps {worst} with a probability below the required {self.percent}",
+            )
+        return self._within(self.largest_scale(ratios), ratios)
+
+    @cached_property
+    def room(self) -> Array:
+        """Distance (k,) of the centre from the nearer bound."""
+        return np.minimum(self.centre - self.lower, self.upper - self.centre).clip(0.0)
+
+    @cached_property
+    def offsets(self) -> Array:
+        """Offsets (samples, k) of the parts, in half widths."""
+        return random_offsets(self.samples, self.centre.size, self.distribution, self.seed)
 
     @property
     def percent(self) -> str:
         """The target share in words."""
-        return f"{100 * self.target:g} %"
+        return f"{100 * self.probability:g} %"
 
     def keep(self, half: Array) -> Mask:
         """Whether each part keeps each limit, (samples, c)."""
@@ -170,7 +161,7 @@ class _Parts:
         """Largest scale up to which the share of parts is at least the target."""
 
         def lost(scale: float) -> bool:
-            return self.share(self.half(ratios, scale)) < self.target
+            return self.share(self.half(ratios, scale)) < self.probability
 
         steps = np.linspace(0.0, float((self.room / ratios).max()), MARCH + 1).tolist()
         first = next((place for place in range(1, MARCH + 1) if lost(steps[place])), None)
@@ -189,23 +180,22 @@ class _Parts:
         error = error_of_share(share, len(self.offsets))
         return WidestTolerances(zero, share, error, self.interval(zero), limit, zero.astype(bool), sentence)
 
-
-def _result(parts: _Parts, scale: float, ratios: Array) -> WidestTolerances:
-    top = float((parts.room / ratios).max())
-    if scale <= 1e-6 * top:
-        first = parts.most_broken(parts.half(ratios, 1e-3 * top))
-        return parts.nothing(first, f"as soon as parts differ, less than {parts.percent} of them keep {first}")
-    half = parts.half(ratios, scale)
-    at_rim = half >= parts.room * (1.0 - 1e-9)
-    # The limit that most parts break just beyond is the limiting one.
-    limit = RIM if at_rim.all() else parts.most_broken(parts.half(ratios, scale * 1.02))
-    share = parts.share(half)
-    error = error_of_share(share, len(parts.offsets))
-    interval, (promise, open_errors) = parts.interval(half), parts.texts
-    within = f"Within these tolerances {percent(share)} % ({interval.words}) of the parts {promise}; {parts.percent} are required."
-    rim = "Where a tolerance ends at the bound of the region, no run shows whether it may be wider."
-    sentences = [within, f"These tolerances are limited by {limit}.", open_errors, rim if at_rim.any() else ""]
-    return WidestTolerances(half, share, error, interval, limit, at_rim, " ".join(filter(None, sentences)))
+    def _within(self, scale: float, ratios: Array) -> WidestTolerances:
+        """The tolerances at a scale, and what limits them."""
+        top = float((self.room / ratios).max())
+        if scale <= 1e-6 * top:
+            first = self.most_broken(self.half(ratios, 1e-3 * top))
+            return self.nothing(first, f"as soon as parts differ, less than {self.percent} of them keep {first}")
+        half = self.half(ratios, scale)
+        at_rim = half >= self.room * (1.0 - 1e-9)
+        # The limit that most parts break just beyond is the limiting one.
+        limit = RIM if at_rim.all() else self.most_broken(self.half(ratios, scale * 1.02))
+        share, interval = self.share(half), self.interval(half)
+        error = error_of_share(share, len(self.offsets))
+        within = f"Within these tolerances {percent(share)} % ({interval.words}) of the parts {self.promise}; {self.percent} are required."
+        rim = "Where a tolerance ends at the bound of the region, no run shows whether it may be wider."
+        sentences = [within, f"These tolerances are limited by {limit}.", self.open_errors, rim if at_rim.any() else ""]
+        return WidestTolerances(half, share, error, interval, limit, at_rim, " ".join(filter(None, sentences)))
 
 
 NEIGHBOURS = 10  # runs a coefficient of the local linear fit, of which tricube weights count about half

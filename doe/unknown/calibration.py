@@ -186,7 +186,8 @@ def matched(
         steady = wave > 0 and abs(volumes[-1] - volumes[-2]) < STEADY * volumes[-2]
         if steady or float(np.median(share[fits], axis=0).max()) < GOOD or wave == waves - 1:
             break
-        points = _spread_over(candidates[fits], unknowns, cells, measured, wave, count, random)
+        agrees = partial(_agrees, unknowns, cells, measured, wave)
+        points = _spread_over(candidates[fits], agrees, count, random)
     assert batch is not None and cells is not None
     match = Matched(measured, unknowns, batch, cells, volumes, refuted, None, 0.0)
     # A discrepancy beyond the allowed one may still show patterns; an exact simulation that is refuted identifies nothing.
@@ -217,18 +218,15 @@ def _dependent(unknowns: Unknowns, quantiles: Array) -> Array:
     return unknowns.quantiles(special.ndtri(quantiles.clip(1e-9, 1.0 - 1e-9)))
 
 
-def _spread_over(
-    plausible_sets: Array,
-    unknowns: Unknowns,
-    cells: Cells,
-    measured: Measured,
-    wave: int,
-    count: int,
-    random: np.random.Generator,
-) -> Array:
-    def fits(quantiles: Array) -> Mask:
-        return plausible(implausibility(cells, measured, _dependent(unknowns, quantiles))[0], wave)
+def _agrees(unknowns: Unknowns, cells: Cells, measured: Measured, wave: int, quantiles: Array) -> Mask:
+    """Plausible input sets (n,) among quantiles (n, d)."""
+    return plausible(implausibility(cells, measured, _dependent(unknowns, quantiles))[0], wave)
 
+
+def _spread_over(
+    plausible_sets: Array, fits: Callable[[Array], Mask], count: int, random: np.random.Generator
+) -> Array:
+    """As many input sets evenly spread over the plausible ones."""
     candidates = more_sets(plausible_sets, fits, 4 * count, random)
     if len(candidates) > 20 * count:
         candidates = random.permutation(candidates)[: 20 * count]

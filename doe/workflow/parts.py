@@ -163,27 +163,17 @@ def manufacture_of(group: ClearanceParts, step: float) -> Manufacture:
     rollers = sum(abs(part.coefficient) for part in group.parts if part.graded)
     names = list(widths[0][1])
     finer = names[names.index(group.grade) :: -1]
-    candidates = [
-        _by_grade(group, grade, half, widths, rollers, finer[0])
-        for half in (ROLLER_HALF_WIDTHS if rollers else ROLLER_HALF_WIDTHS[:1])
-        for grade in finer
-    ]
+
+    def made(grade: str, half: float) -> Manufacture:
+        whole = 0.5 * sum(abs(part.coefficient) * table[grade] for part, table in widths) + rollers * half
+        sizes = " and ".join(f"{part.name} {1e3 * table[grade]:g} um" for part, table in widths)
+        graded = "".join(f", {part.name} within {1e3 * half:g} um of nominal" for part in group.parts if part.graded)
+        why = "" if grade == finer[0] else f"; {finer[0]} would be wider than a step"
+        return Manufacture(round(whole, DIGITS), half, f"{grade} (ISO 286-1): {sizes}{graded}{why}")
+
+    halves = ROLLER_HALF_WIDTHS if rollers else ROLLER_HALF_WIDTHS[:1]
+    candidates = [made(grade, half) for half in halves for grade in finer]
     return next((candidate for candidate in candidates if candidate.half_width <= step), candidates[-1])
-
-
-def _by_grade(
-    group: ClearanceParts,
-    grade: str,
-    half: float,
-    widths: list[tuple[Part, dict[str, float]]],
-    rollers: float,
-    usual: str,
-) -> Manufacture:
-    whole = 0.5 * sum(abs(part.coefficient) * table[grade] for part, table in widths) + rollers * half
-    sizes = " and ".join(f"{part.name} {1e3 * table[grade]:g} um" for part, table in widths)
-    graded = "".join(f", {part.name} within {1e3 * half:g} um of nominal" for part in group.parts if part.graded)
-    why = "" if grade == usual else f"; {usual} would be wider than a step"
-    return Manufacture(round(whole, DIGITS), half, f"{grade} (ISO 286-1): {sizes}{graded}{why}")
 
 
 def _grades(group: ClearanceParts, part: Part) -> dict[str, float]:

@@ -16,7 +16,7 @@ import numpy as np
 
 from doe.pareto.manufacture import random_offsets
 from doe.pareto.search import Goals
-from doe.pareto.tolerance import RIM, Neighbourhood, WidestTolerances, widest_tolerances
+from doe.pareto.tolerance import RIM, Neighbourhood, Parts, WidestTolerances
 from doe.study_file.sections import Tolerances
 from doe.workflow.confirmation import Confirmed, gains
 from doe.workflow.front import Draws, draws_of, keeping, open_errors
@@ -406,11 +406,10 @@ class _PickParts:
         ratios = np.array([half_widths.get(name, np.nan) for name in study.factors])
         low, high = _box(study, self.point, None if self.neighbours is None else np.nan_to_num(ratios))
         count = None if draws is None else keeping(study, draws, self.point, free, least - slack)
-        tolerances = widest_tolerances(
-            self._costs,
-            self.point[free],
-            np.hstack([self.reference - least, no_violations]) + slack,
-            (study.step if np.isnan(ratios[free]).any() else ratios)[free],
+        parts = Parts(
+            objectives=self._costs,
+            centre=self.point[free],
+            limits=(np.hstack([self.reference - least, no_violations]) + slack)[0],
             lower=low[free],
             upper=high[free],
             names=self._names,
@@ -419,6 +418,7 @@ class _PickParts:
             open_errors=open_errors(self.study.surfaces, searched=self.neighbours is not None),
             **settings.model_dump(include={"probability", "distribution", "samples", "seed"}),
         )
+        tolerances = parts.widest((study.step if np.isnan(ratios[free]).any() else ratios)[free])
         return replace(tolerances, sentence=_impossible(demands) or tolerances.sentence).among(free, self.point.size)
 
     def _promise(self, demands: Sequence[KeptGain]) -> str:

@@ -11,9 +11,9 @@ from scipy.stats import norm
 from doe.pareto import Goals, front
 from doe.pareto.manufacture import Quadratic, ToleranceBox, even_offsets, offsets, random_offsets, tolerance_aware_front
 from doe.pareto.search import Archive
-from doe.pareto.tolerance import RIM, widest_tolerances
+from doe.pareto.tolerance import RIM, Parts
 
-BOX = {"lower": [-10.0, -10.0], "upper": [10.0, 10.0]}
+BOX = {"lower": np.full(2, -10.0), "upper": np.full(2, 10.0)}
 
 
 def some_quadratic(seed, factors):
@@ -160,10 +160,16 @@ def first_factor(points):
     return points[:, :1]
 
 
+def widest(objectives, pick, limits, ratios, **options):
+    """The widest tolerances about a pick."""
+    parts = Parts(objectives=objectives, centre=np.array(pick), limits=np.array(limits), **options)
+    return parts.widest(np.array(ratios))
+
+
 @pytest.mark.parametrize("distribution", ["uniform", "normal"])
 def test_widest_tolerance_of_one_linear_limit_is_the_closed_form(distribution):
     # Parts at h u keep the limit 1 while u <= 1/h: at 95 % for a uniform u where 1/h = 0.9.
-    found = widest_tolerances(
+    found = widest(
         first_factor, [0.0, 0.0], [1.0], [1.0, 1.0], names=["x"], distribution=distribution, samples=40000, **BOX
     )
     outside = norm.cdf(-3)
@@ -174,13 +180,13 @@ def test_widest_tolerance_of_one_linear_limit_is_the_closed_form(distribution):
 
 
 def test_ratios_are_kept_and_the_first_limit_is_named():
-    found = widest_tolerances(lambda points: points, [0.0, 0.0], [1.0, 1.0], [1.0, 3.0], names=["a", "b"], **BOX)
+    found = widest(lambda points: points, [0.0, 0.0], [1.0, 1.0], [1.0, 3.0], names=["a", "b"], **BOX)
     assert found.half_widths[1] == pytest.approx(3 * found.half_widths[0])
     assert found.limited_by == "b"
 
 
 def test_region_ends_what_no_limit_ends():
-    found = widest_tolerances(first_factor, [9.0, 0.0], [99.0], [1.0, 1.0], names=["x"], **BOX)
+    found = widest(first_factor, [9.0, 0.0], [99.0], [1.0, 1.0], names=["x"], **BOX)
     assert found.half_widths.tolist() == [1.0, 10.0]
     assert found.limited_by == RIM and found.probability == 1.0
     assert "no run shows" in found.sentence
@@ -188,7 +194,7 @@ def test_region_ends_what_no_limit_ends():
 
 def test_pick_that_fails_or_just_keeps_leaves_no_tolerance():
     for at, words in ((1.1, "even the exact selected design"), (1.0, "as soon as parts differ")):
-        found = widest_tolerances(first_factor, [at, 0.0], [1.0], [1.0, 1.0], names=["x"], **BOX)
+        found = widest(first_factor, [at, 0.0], [1.0], [1.0, 1.0], names=["x"], **BOX)
         assert found.half_widths.tolist() == [0.0, 0.0]
         assert words in found.sentence and found.limited_by == "x"
 
@@ -196,8 +202,7 @@ def test_pick_that_fails_or_just_keeps_leaves_no_tolerance():
 def test_uncertain_surfaces_leave_less():
     random = np.random.default_rng(1).normal(0.0, 0.3, (4096, 1))
     sure, unsure = (
-        widest_tolerances(lambda p, e=e: p[:, :1] + e, [0.0, 0.0], [1.0], [1.0, 1.0], names=["x"], **BOX)
-        for e in (0.0, random)
+        widest(lambda p, e=e: p[:, :1] + e, [0.0, 0.0], [1.0], [1.0, 1.0], names=["x"], **BOX) for e in (0.0, random)
     )
     assert 0.5 < unsure.half_widths[0] / sure.half_widths[0] < 0.95
 
@@ -208,4 +213,4 @@ def test_uncertain_surfaces_leave_less():
 def test_widest_tolerances_refuse_what_makes_no_sense(change, words):
     arguments = {"pick": [0.0, 0.0], "limits": [1.0], "ratios": [1.0, 1.0]} | change
     with pytest.raises(ValueError, match=words):
-        widest_tolerances(first_factor, names=["x"], **arguments, **BOX)
+        widest(first_factor, names=["x"], **arguments, **BOX)

@@ -11,7 +11,7 @@ from short_studies import short_study
 
 from doe.designs import central_composite
 from doe.pareto.manufacture import interval_of_share, percent, random_offsets
-from doe.pareto.tolerance import widest_tolerances
+from doe.pareto.tolerance import Parts
 from doe.response_surface import fit, model_matrix
 from doe.response_surface.adequacy import correlation
 from doe.study_file.sections import Tolerances
@@ -141,9 +141,12 @@ def test_closed_form_of_the_interval_of_one_linear_limit():
     def kept(parts):
         return np.array([(parts[:, 0] + error <= 1.0).sum() for error in errors])
 
-    found = widest_tolerances(
-        lambda parts: parts[:, :1], [0.0], [1.0], [1.0], lower=[-10.0], upper=[10.0], names=["x"], distribution="uniform", count_on_draws=kept,
+    limit, reach = np.array([1.0]), np.array([10.0])
+    parts = Parts(
+        objectives=lambda parts: parts[:, :1], centre=np.zeros(1), limits=limit, lower=-reach, upper=reach, names=["x"],
+        distribution="uniform", count_on_draws=kept,
     )  # fmt: skip
+    found = parts.widest(limit)
     half = found.half_widths[0]
     share = (1.0 + (1.0 - errors) / half).clip(0.0, 2.0) / 2.0
     # The shortest interval of these shares, which pile up at 1.
