@@ -2,7 +2,7 @@
 
 import pytest
 
-from doe.report.sections.front_pictures import MOST_PAIRS, Front, drawn_pairs, near, pair_stills
+from doe.report.sections.front_pictures import MOST_PAIRS, Front, Fronts, drawn_pairs, near
 from doe.report.still import save
 from doe.workflow.front_record import Point
 
@@ -26,9 +26,9 @@ def test_unit_a_picture_of_the_front_has_a_few_panels_in_a_row(tmp_path, goals, 
 
     names = [f"response_{place}_N" for place in range(goals + limited)]
     front = Front("front", "drawn", [Point({}, dict.fromkeys(names, float(x))) for x in range(3)])
-    pairs, path = drawn_pairs(["min"] * goals + ["none"] * limited), tmp_path / "front.png"
-    stills = pair_stills(names, pairs, [front], {"baseline": front.points[0]})
-    assert len(stills) == len(pairs) + 1
+    kinds, path = ["min"] * goals + ["none"] * limited, tmp_path / "front.png"
+    stills = Fronts([front], {"baseline": front.points[0]}).pairs(dict(zip(names, kinds, strict=True)))
+    assert len(stills) == len(drawn_pairs(kinds)) + 1
     save(stills, path)
     rows, columns = size
     # A row of the legend alone is lower.

@@ -7,14 +7,7 @@ from typing import Any
 import numpy as np
 
 from doe.report.sections.answer import tolerances
-from doe.report.sections.front_pictures import (
-    Front,
-    drawn_pairs,
-    hypervolume,
-    pair_stills,
-    parallel_still,
-    search_stills,
-)
+from doe.report.sections.front_pictures import Front, Fronts, hypervolume, search_stills
 from doe.report.still import Still
 from doe.report.summary import SENSES, Summary, change, nearest, share_with_interval
 from doe.workflow.adaptive import Adaptive, FrontComparison, Pull, near_limits, pulls
@@ -51,7 +44,8 @@ def front(summary: Summary, motion: Mapping[str, Any]) -> Section:
     """Pictures that answer to the pointer, the picks, and what they are compared with."""
     marks, result = picks(summary), summary.front
     where = f"of the {WITHOUT}" if "without_tolerances" in marks else "of the selected design"
-    blocks = _pictures(summary.asked, fronts(summary), marks, summary.confirmation)
+    drawn = _drawn(summary.asked, fronts(summary), marks, summary.confirmation)
+    blocks = _pictures(summary.asked, drawn)
     blocks += _judged(summary.asked, result, marks, where)
     blocks += [tolerances(summary.tolerances or {}), Paragraph(summary.tolerances_sentence or ""), *_search(result)]
     blocks += _with_tolerances(summary.asked, result.tolerance_aware)
@@ -64,7 +58,7 @@ def front_blocks(asked: Asked, result: SurfaceFront) -> list[Block]:
     marks = _marks(result, {"knee": result.knee, **result.picks, "pick": result.pick})
     return [
         _picks("Every point of the front", asked, points, Detail.ALL),
-        *_pictures(asked, _fronts(asked, result), marks, {}),
+        *_pictures(asked, _drawn(asked, _fronts(asked, result), marks, {})),
         *_judged(asked, result, marks, "of the selected design"),
         *_search(result),
         *_with_tolerances(asked, result.tolerance_aware),
@@ -125,33 +119,33 @@ def _marks(result: SurfaceFront, points: Mapping[str, Point]) -> dict[str, Point
     return {"baseline": result.baseline, **points}
 
 
-def _pictures(
+def _drawn(
     asked: Asked, sets: Sequence[Front], marks: Mapping[str, Point], confirmed: Mapping[str, ConfirmedPoint]
-) -> list[Block]:
+) -> Fronts:
+    """The fronts of a study with the limits of its responses."""
+    limits = {response.name: response.bounds for response in asked.responses if response.bounds}
+    return Fronts(sets, marks, confirmed, limits)
+
+
+def _pictures(asked: Asked, drawn: Fronts) -> list[Block]:
     """The controls, pairs of responses with one legend, and parallel coordinates; none without a front of two responses."""
-    if not sets or len(asked.names) < 2:
+    if not drawn.sets or len(asked.names) < 2:
         return []
     caption = "Each line is a point of the front: its clearances to the left, its responses to the right."
-    across = parallel_still(asked.factors, asked.names, sets, marks)
     return [
         Widget("front"),
-        Figures([still.svg for still in _pairs(asked, sets, marks, confirmed)], "", "pairs"),
-        Figures([across.svg], caption, "parallel"),
+        Figures([still.svg for still in drawn.pairs(_goals(asked))], "", "pairs"),
+        Figures([drawn.parallel(asked.factors, asked.names).svg], caption, "parallel"),
     ]
 
 
-def _pairs(
-    asked: Asked, sets: Sequence[Front], marks: Mapping[str, Point], confirmed: Mapping[str, ConfirmedPoint]
-) -> list[Still]:
-    """A picture for each pair of responses, and their legend."""
-    limits = {response.name: response.bounds for response in asked.responses if response.bounds}
-    pairs = drawn_pairs([response.goal for response in asked.responses])
-    return pair_stills(asked.names, pairs, sets, marks, confirmed, limits)
+def _goals(asked: Asked) -> dict[str, str]:
+    return {response.name: response.goal for response in asked.responses}
 
 
 def front_stills(summary: Summary) -> list[Still]:
     """Pairs of responses with the fronts, and baseline and picks both on the surfaces and simulated."""
-    return _pairs(summary.asked, fronts(summary), picks(summary), summary.confirmation)
+    return _drawn(summary.asked, fronts(summary), picks(summary), summary.confirmation).pairs(_goals(summary.asked))
 
 
 def robust_stills(front: RobustFront | None) -> list[Still]:
@@ -165,7 +159,7 @@ def robust_stills(front: RobustFront | None) -> list[Still]:
 
     predicted = Front("front", "by emulators", [placed(point) for point in front.points])
     marks = {point.name.removeprefix("robust "): placed(point) for point in front.confirmed}
-    return pair_stills([*names.values()], drawn_pairs(["min"] * len(names)), [predicted], marks)
+    return Fronts([predicted], marks).pairs(dict.fromkeys(names.values(), "min"))
 
 
 def _picks(caption: str, asked: Asked, marks: Mapping[str, Point], detail: Detail = Detail.LEAST) -> Table:

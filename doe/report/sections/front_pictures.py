@@ -27,6 +27,8 @@ if TYPE_CHECKING:
 
 
 Range = tuple[float, float]
+# Two responses of a confirmed point, and the half-widths of their intervals.
+Simulated = tuple[Point, tuple[float | None, float | None]]
 
 
 # Marker, size [pt] and colour of a point by its name, so that no two are told apart by colour alone.
@@ -115,41 +117,105 @@ def near(bounds: Iterable[float], values: Iterable[float]) -> list[float]:
     return [bound for bound in bounds if 2.0 * low - high <= bound <= 2.0 * high - low]
 
 
-def pair_stills(
-    names: Sequence[str],
-    pairs: Sequence[tuple[int, int]],
-    sets: Sequence[Front],
-    marks: Mapping[str, FrontPoint],
-    confirmed: Mapping[str, ConfirmedPoint] = MappingProxyType({}),
-    limits: Mapping[str, Sequence[float]] = MappingProxyType({}),
-) -> list[Still]:
-    """The fronts over pairs of responses, which are places among their ``names``, and what the marks mean."""
-    stills = [pair_still((one, names[one]), (two, names[two]), sets, marks, confirmed, limits) for one, two in pairs]
-    return [*stills, legend_still(sets, marks, bool(confirmed), bool(limits))]
+@dataclass(frozen=True)
+class Fronts:
+    """Fronts that are drawn together, with ``marks`` by name, what simulation ``confirmed`` of them, and limits by response."""
+
+    sets: Sequence[Front]
+    marks: Mapping[str, FrontPoint]
+    confirmed: Mapping[str, ConfirmedPoint] = MappingProxyType({})
+    limits: Mapping[str, Sequence[float]] = MappingProxyType({})
+
+    @property
+    def points(self) -> list[FrontPoint]:
+        """Points of all fronts, and the marks."""
+        return [*(point for front in self.sets for point in front.points), *self.marks.values()]
+
+    def pairs(self, goals: Mapping[str, str]) -> list[Still]:
+        """The fronts over pairs of responses, whose ``goals`` are by name, and what the marks mean."""
+        names = list(enumerate(goals))
+        pairs = drawn_pairs(list(goals.values()))
+        return [*(self._pair(names[one], names[two]) for one, two in pairs), self._legend()]
+
+    def _pair(self, one: tuple[int, str], two: tuple[int, str]) -> Still:
+        """The fronts over two responses, given as place and name, with limits nearby and with what simulation confirmed."""
+        simulated = {name: _simulated(point, one[1], two[1]) for name, point in self.confirmed.items()}
+        axes, drawn = [], dict[str, list[float]]()
+        for along, (place, name) in enumerate((one, two)):
+            values = [point.responses[name] for point in self.points] + [pair[0][along] for pair in simulated.values()]
+            drawn[name] = near(self.limits.get(name, ()), values)
+            axes.append(Coordinate("responses", name, place, span([*values, *drawn[name]])))
+        words = f"Front: {quantity(two[1])[0]} on {quantity(one[1])[0]}"
+        still = Still(words, partial(self._draw_pair, axes, simulated, drawn))
+        return replace(still, data={"front": _data("pair", axes, still)})
+
+    def _draw_pair(
+        self,
+        axes: Sequence[Coordinate],
+        simulated: Mapping[str, Simulated],
+        limits: Mapping[str, Sequence[float]],
+        axis: "Axes",
+    ) -> None:
+        across, up = axes
+        axis.set(xlim=across.ends, ylim=up.ends, xlabel=label(across.name), ylabel=label(up.name))
+        for draw, response in ((axis.axvline, across), (axis.axhline, up)):
+            for bound in limits.get(response.name, ()):
+                draw(bound, **LIMIT)
+        for front in self.sets:
+            _dots(axis, front.role, across.values(front.points), up.values(front.points))
+        for name, point in self.marks.items():
+            _mark(axis, name, (point.responses[across.name], point.responses[up.name]))
+        for name, (place, half_widths) in simulated.items():
+            for line in error_bars(place, half_widths, (across.ends, up.ends)):
+                axis.plot(*zip(*line, strict=True), color=COLOURS["ink"], linewidth=1.4)
+            _mark(axis, name, place, simulated=True)
+
+    def _legend(self) -> Still:
+        """What the marks of the pictures mean; a hollow mark is the same point, simulated."""
+        count = len(self.sets) + len(self.marks) + bool(self.confirmed) + bool(self.limits)
+        height = 20.0 + LEGEND_ROW * -(-count // 2)
+        words = "Marks of the pictures of the front"
+        return Still(words, self._draw_legend, height=height, left_margin=4.0, bottom_margin=4.0)
+
+    def _draw_legend(self, axis: "Axes") -> None:
+        from matplotlib.lines import Line2D
+
+        axis.set_axis_off()
+        dot: dict[str, Any] = {"linestyle": "", "marker": "o"}
+        handles = []
+        for front in self.sets:
+            colour, ring = FRONTS[front.role]
+            look: dict[str, Any] = {"markerfacecolor": COLOURS["paper"], "markeredgewidth": RING} if ring else {}
+            handles.append(
+                Line2D([], [], **dot, **look, color=COLOURS[colour], markersize=DOT, label=f"front {front.words}")
+            )
+        for name in self.marks:
+            marker, size, colour = MARKS.get(name, OTHER)
+            look = {"color": COLOURS[colour], "markersize": size, "label": point_words(name)}
+            handles.append(Line2D([], [], linestyle="", marker=marker, **look))
+        if self.confirmed:
+            hollow: dict[str, Any] = {"markerfacecolor": COLOURS["paper"], "markersize": 8.0, "color": COLOURS["ink"]}
+            handles.append(Line2D([], [], linestyle="", marker="s", **hollow, label="hollow: simulated"))
+        if self.limits:
+            handles.append(Line2D([], [], **LIMIT, label="limit"))
+        axis.legend(handles=handles, ncol=2, loc="upper left", borderaxespad=0.0)
+
+    def parallel(self, inputs: Sequence[Factor], names: Sequence[str]) -> Still:
+        """Parallel coordinates: an axis for each factor and response, a line for each point."""
+        keys = [("factors", place, factor.name) for place, factor in enumerate(inputs)]
+        keys += [("responses", place, name) for place, name in enumerate(names)]
+        axes = [
+            Coordinate(kind, name, place, span((getattr(p, kind)[name] for p in self.points), 0.02))
+            for kind, place, name in keys
+        ]
+        words = f"Parallel coordinates of {len(self.points) - len(self.marks)} points of the front"
+        both = {name: self.marks[name] for name in ("baseline", "pick") if name in self.marks}
+        look = PARALLEL | {"width": max(PARALLEL["width"], AXIS_WIDTH * len(axes))}
+        still = Still(words, partial(_parallel, axes, self.sets, both), **look)
+        return replace(still, data={"front": _data("parallel", axes, still)})
 
 
-def pair_still(
-    one: tuple[int, str],
-    two: tuple[int, str],
-    sets: Sequence[Front],
-    marks: Mapping[str, FrontPoint],
-    confirmed: Mapping[str, ConfirmedPoint],
-    limits: Mapping[str, Sequence[float]],
-) -> Still:
-    """The fronts over two responses, given as place and name, with limits nearby and with what simulation confirmed."""
-    simulated = {name: _simulated(point, one[1], two[1]) for name, point in confirmed.items()}
-    points = [*marks.values(), *(point for front in sets for point in front.points)]
-    axes, drawn = [], dict[str, list[float]]()
-    for along, (place, name) in enumerate((one, two)):
-        values = [point.responses[name] for point in points] + [pair[0][along] for pair in simulated.values()]
-        drawn[name] = near(limits.get(name, ()), values)
-        axes.append(Coordinate("responses", name, place, span([*values, *drawn[name]])))
-    words = f"Front: {quantity(two[1])[0]} on {quantity(one[1])[0]}"
-    still = Still(words, partial(_pair, axes, sets, marks, simulated, drawn))
-    return replace(still, data={"front": _data("pair", axes, still)})
-
-
-def _simulated(point: ConfirmedPoint, one: str, two: str) -> tuple[Point, tuple[float | None, float | None]]:
+def _simulated(point: ConfirmedPoint, one: str, two: str) -> Simulated:
     """Two responses of a confirmed point with the half-widths of their intervals."""
     x, y = (point.responses[name] for name in (one, two))
     return (x.value, y.value), (x.error, y.error)
@@ -159,29 +225,6 @@ def _data(kind: str, axes: Sequence[Coordinate], still: Still) -> str:
     """What ``front.js`` needs to find a point: kind, place and ends of every axis, and the frame."""
     rows = [[axis.kind, axis.place, *axis.ends] for axis in axes]
     return json.dumps({"kind": kind, "axes": rows, "frame": still.frame}, separators=(",", ":"))
-
-
-def _pair(
-    axes: Sequence[Coordinate],
-    sets: Sequence[Front],
-    marks: Mapping[str, FrontPoint],
-    simulated: Mapping[str, tuple[Point, tuple[float | None, float | None]]],
-    limits: Mapping[str, Sequence[float]],
-    axis: "Axes",
-) -> None:
-    across, up = axes
-    axis.set(xlim=across.ends, ylim=up.ends, xlabel=label(across.name), ylabel=label(up.name))
-    for draw, response in ((axis.axvline, across), (axis.axhline, up)):
-        for bound in limits.get(response.name, ()):
-            draw(bound, **LIMIT)
-    for front in sets:
-        _dots(axis, front.role, across.values(front.points), up.values(front.points))
-    for name, point in marks.items():
-        _mark(axis, name, (point.responses[across.name], point.responses[up.name]))
-    for name, (place, half_widths) in simulated.items():
-        for line in error_bars(place, half_widths, (across.ends, up.ends)):
-            axis.plot(*zip(*line, strict=True), color=COLOURS["ink"], linewidth=1.4)
-        _mark(axis, name, place, simulated=True)
 
 
 def error_bars(
@@ -227,56 +270,6 @@ def _mark(axis: "Axes", name: str, place: Point, simulated: bool = False) -> Non
         *place, marker, markersize=size, markerfacecolor=face, markeredgecolor=edge, markeredgewidth=thick
     )
     name_marks(line, "mark", [f"{words}, simulated" if simulated else words])
-
-
-def legend_still(sets: Sequence[Front], marks: Mapping[str, FrontPoint], confirmed: bool, limited: bool) -> Still:
-    """What the marks of the pictures mean; a hollow mark is the same point, simulated."""
-    count = len(sets) + len(marks) + confirmed + limited
-    draw = partial(_legend, sets, list(marks), confirmed, limited)
-    height = 20.0 + LEGEND_ROW * -(-count // 2)
-    return Still("Marks of the pictures of the front", draw, height=height, left_margin=4.0, bottom_margin=4.0)
-
-
-def _legend(sets: Sequence[Front], names: Sequence[str], confirmed: bool, limited: bool, axis: "Axes") -> None:
-    from matplotlib.lines import Line2D
-
-    axis.set_axis_off()
-    dot: dict[str, Any] = {"linestyle": "", "marker": "o"}
-    handles = []
-    for front in sets:
-        colour, ring = FRONTS[front.role]
-        look: dict[str, Any] = {"markerfacecolor": COLOURS["paper"], "markeredgewidth": RING} if ring else {}
-        handles.append(
-            Line2D([], [], **dot, **look, color=COLOURS[colour], markersize=DOT, label=f"front {front.words}")
-        )
-    for name in names:
-        marker, size, colour = MARKS.get(name, OTHER)
-        look = {"color": COLOURS[colour], "markersize": size, "label": point_words(name)}
-        handles.append(Line2D([], [], linestyle="", marker=marker, **look))
-    if confirmed:
-        hollow: dict[str, Any] = {"markerfacecolor": COLOURS["paper"], "markersize": 8.0, "color": COLOURS["ink"]}
-        handles.append(Line2D([], [], linestyle="", marker="s", **hollow, label="hollow: simulated"))
-    if limited:
-        handles.append(Line2D([], [], **LIMIT, label="limit"))
-    axis.legend(handles=handles, ncol=2, loc="upper left", borderaxespad=0.0)
-
-
-def parallel_still(
-    inputs: Sequence[Factor], names: Sequence[str], sets: Sequence[Front], marks: Mapping[str, FrontPoint]
-) -> Still:
-    """Parallel coordinates: an axis for each factor and response, a line for each point."""
-    keys = [("factors", place, factor.name) for place, factor in enumerate(inputs)]
-    keys += [("responses", place, name) for place, name in enumerate(names)]
-    points = [*(point for front in sets for point in front.points), *marks.values()]
-    axes = [
-        Coordinate(kind, name, place, span((getattr(p, kind)[name] for p in points), 0.02))
-        for kind, place, name in keys
-    ]
-    words = f"Parallel coordinates of {len(points) - len(marks)} points of the front"
-    both = {name: marks[name] for name in ("baseline", "pick") if name in marks}
-    look = PARALLEL | {"width": max(PARALLEL["width"], AXIS_WIDTH * len(axes))}
-    still = Still(words, partial(_parallel, axes, sets, both), **look)
-    return replace(still, data={"front": _data("parallel", axes, still)})
 
 
 def _parallel(axes: Sequence[Coordinate], sets: Sequence[Front], marks: Mapping[str, FrontPoint], axis: "Axes") -> None:
