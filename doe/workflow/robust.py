@@ -113,7 +113,6 @@ def relative_gains(goals: Goals, designs: NoisyValues) -> NoisyValues:
 
 def simulate_designs(
     case: Case,
-    inputs: Sequence[Input],
     quantiles: Array,
     designs: Mapping[str, Sequence[str]],
     simulations: Simulations,
@@ -121,7 +120,7 @@ def simulate_designs(
     overrides: Sequence[str] = (),
 ) -> tuple[Pairs, tuple[Failure, ...]]:
     """Simulate designs, each as overrides of the scene, at input sets; sets at which any design failed are left out."""
-    shared, title = (case, inputs, quantiles, simulations, seeds), f"input sets of the {{}}, from seed {seeds},"
+    shared, title = (case, case.every, quantiles, simulations, seeds), f"input sets of the {{}}, from seed {seeds},"
     sets_of_design = [run(*shared, [*design, *overrides], title.format(name)) for name, design in designs.items()]
     places = reduce(np.intersect1d, (sets.places for sets in sets_of_design))
     outputs = NoisyValues.stacked([sets.outputs.at(np.isin(sets.places, places)) for sets in sets_of_design])
@@ -170,7 +169,7 @@ def find_robust_front(
     designs |= {name: study.assignments(point) for name, (point, _) in candidates.items()}
     rows = fresh_rows(settings.points)
     quantiles = case.joint(case.every).sets(1 << int(rows.max()).bit_length(), case.uncertain.seed)[rows]
-    fresh_pairs, new_failures = simulate_designs(case, case.every, quantiles, designs, simulations)
+    fresh_pairs, new_failures = simulate_designs(case, quantiles, designs, simulations)
     confirmed = list[ConfirmedGain]()
     for number, (name, (point, reason)) in enumerate(candidates.items(), 1):
         gains, variances = fresh_pairs.gains(goals, number)
@@ -358,7 +357,7 @@ def _pairs_in_rounds(
 ) -> tuple[Pairs, int, tuple[Failure, ...]]:
     """Both designs at the input sets, with further replicates where a gain is in doubt; runs spent; and failures."""
     goals, replicates = study.goals, case.replicates
-    pairs, failures = simulate_designs(case, case.every, quantiles, designs, simulations)
+    pairs, failures = simulate_designs(case, quantiles, designs, simulations)
     spent, budget = 2 * len(pairs.quantiles), round(2 * len(pairs.quantiles) * (1.0 + study.file.robust.settle))
     rows = in_doubt(*pairs.gains(goals))
     for round_number in range(ROUNDS):
@@ -369,9 +368,8 @@ def _pairs_in_rounds(
             break
         overrides = [f"numerics.replicates={replicates * multiple}"]
         seeds = (round_number + 1) * ROUND_SEEDS
-        new_pairs, new_failures = simulate_designs(
-            case, case.every, pairs.quantiles[rows], designs, simulations, seeds, overrides
-        )
+        quantiles = pairs.quantiles[rows]
+        new_pairs, new_failures = simulate_designs(case, quantiles, designs, simulations, seeds, overrides)
         rows, spent, failures = rows[new_pairs.places], spent + 2 * multiple * len(rows), (*failures, *new_failures)
         pairs = pairs.joined(rows, new_pairs)
         doubtful = in_doubt(*pairs.gains(goals))

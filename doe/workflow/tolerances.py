@@ -9,7 +9,7 @@ tolerances without that gain.
 """
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -50,28 +50,6 @@ class KeptGain(Record):
     def words(self) -> str:
         """'impact force'."""
         return quantity(self.response)[0]
-
-
-def demands_of(
-    study: Problem, settings: Tolerances, percent: Array, simulated: tuple[Confirmed, Confirmed] | None = None
-) -> list[KeptGain]:
-    """Demands on the responses with a goal, whose predicted gains are ``percent`` (q,) of the baseline.
-
-    ``simulated``: baseline and pick, which say whether a gain is real; without them every gain above zero is.
-    """
-    responses = [study.file.response[index] for index in study.goals.objectives]
-    names = [response.name for response in responses]
-    by_name = dict(zip(names, percent.tolist(), strict=True))
-    counted = _counted(
-        settings,
-        by_name,
-        simulated and {name for name, gain in gains(study, *simulated).items() if gain.percent > gain.error_percent},
-    )
-    least = {name: settings.at_least.get(name, settings.keep * by_name[name]) for name in names if name in counted}
-    return [
-        KeptGain(by_name[response.name], least.get(response.name), response=response.name, goal=response.goal)
-        for response in responses
-    ]
 
 
 def _counted(settings: Tolerances, percent: Mapping[str, float], real: Collection[str] | None) -> Collection[str]:
@@ -268,41 +246,6 @@ def _requirement(limit: str) -> str:
     return f"{'Keeping' if limit.startswith(GAIN) else 'Meeting'} {_limit_words(limit)}"
 
 
-def widest_tolerances_of(
-    study: Problem,
-    point: Array,
-    settings: Tolerances,
-    confirmed: Mapping[str, Confirmed] | None = None,
-    neighbours: Neighbourhood | None = None,
-    search_draws: Draws | None = None,
-    scene: Scene | None = None,
-) -> PickTolerances | None:
-    """Widest tolerances about a point (k,) in factor units; None where no factor has a tolerance.
-
-    A part keeps its promise if all limits hold and each gain that counts has its least size. ``confirmed``: simulated
-    points, "baseline" and "pick" among them; they narrow the errors of the surfaces and say which gains are real. ``scene``: the bearing at the
-    point, whose parts have grades; without it none are stated.
-
-    With ``neighbours``, about a pick of a search, the levels are those simulated at the pick and at the baseline. Parts may then
-    lie beyond the region by the factors' own tolerances, and ``search_draws`` draws the errors of the search.
-    """
-    if study.rigid.all():
-        return None
-    parts = _PickParts(study, point, settings, confirmed or {}, neighbours, scene)
-    simulated = (confirmed["baseline"], confirmed["pick"]) if confirmed and "pick" in confirmed else None
-    demands = demands_of(study, settings, parts.percent, simulated)
-    draws = search_draws or draws_of(study, confirmed)
-    tolerances = parts.tolerances(demands, draws)
-    if not any(demand.counts for demand in demands) and not parts.goals.limited:
-        return replace(tolerances, widest=_none(tolerances.widest), demands=demands, grades={})
-    gain = tolerances.limiting_gain
-    if not gain or not tolerances.too_fine:
-        return tolerances
-    without = [replace(demand, at_least_percent=None) if demand.response == gain else demand for demand in demands]
-    relaxed = parts.tolerances(without, None)
-    return replace(tolerances, relaxed=relaxed)
-
-
 def _none(widest: WidestTolerances) -> WidestTolerances:
     """No tolerances, for a pick without a gain or a limit to keep."""
     sentence = "No tolerances follow, because the selected design has no gain to keep and no response has a limit."
@@ -324,15 +267,56 @@ def _impossible(demands: Sequence[KeptGain]) -> str:
 
 
 @dataclass(frozen=True, eq=False)
-class _PickParts:
-    """Parts about a pick: their responses, the predicted gains there, and the widest tolerances for demands on these."""
+class PickParts:
+    """Parts about a pick, a ``point`` (k,) in factor units: their responses, the gains there, and the widest tolerances.
+
+    A part keeps its promise if all limits hold and each gain that counts has its least size. ``confirmed``: simulated
+    points, "baseline" and "pick" among them; they narrow the errors of the surfaces and say which gains are real. ``scene``: the bearing at the
+    point, whose parts have grades; without it none are stated.
+
+    With ``neighbours``, about a pick of a search, the levels are those simulated at the pick and at the baseline. Parts may then
+    lie beyond the region by the factors' own tolerances, and ``search_draws`` draws the errors of the search.
+    """
 
     study: Problem
     point: Array
     settings: Tolerances
-    confirmed: Mapping[str, Confirmed]
-    neighbours: Neighbourhood | None
-    scene: Scene | None
+    confirmed: Mapping[str, Confirmed] = field(default_factory=dict)
+    neighbours: Neighbourhood | None = None
+    search_draws: Draws | None = None
+    scene: Scene | None = None
+
+    def widest(self) -> PickTolerances | None:
+        """The widest tolerances; None where no factor has a tolerance."""
+        if self.study.rigid.all():
+            return None
+        demands = self.demands
+        tolerances = self._tolerances(demands, self.search_draws or draws_of(self.study, self.confirmed))
+        if not any(demand.counts for demand in demands) and not self.goals.limited:
+            return replace(tolerances, widest=_none(tolerances.widest), demands=demands, grades={})
+        gain = tolerances.limiting_gain
+        if not gain or not tolerances.too_fine:
+            return tolerances
+        without = [replace(demand, at_least_percent=None) if demand.response == gain else demand for demand in demands]
+        return replace(tolerances, relaxed=self._tolerances(without, None))
+
+    @property
+    def demands(self) -> list[KeptGain]:
+        """Demands on the responses with a goal. Without a simulated pick every gain above zero is real."""
+        settings, responses = self.settings, [self.study.file.response[index] for index in self.goals.objectives]
+        percent = dict(zip((response.name for response in responses), self.percent.tolist(), strict=True))
+        real = None
+        if "pick" in self.confirmed:
+            simulated = gains(self.study, self.confirmed["baseline"], self.confirmed["pick"])
+            real = {name for name, gain in simulated.items() if gain.percent > gain.error_percent}
+        counted = _counted(settings, percent, real)
+        least = {
+            name: settings.at_least.get(name, settings.keep * gain) for name, gain in percent.items() if name in counted
+        }
+        return [
+            KeptGain(percent[response.name], least.get(response.name), response=response.name, goal=response.goal)
+            for response in responses
+        ]
 
     @cached_property
     def goals(self) -> Goals:
@@ -387,7 +371,7 @@ class _PickParts:
             values = values - self._centre_values + here.values + (coded - here.points) @ here.slopes[0]
         return np.hstack([self.goals.costs(values), self.goals.violations(values, values)])
 
-    def tolerances(self, demands: Sequence[KeptGain], draws: Draws | None) -> PickTolerances:
+    def _tolerances(self, demands: Sequence[KeptGain], draws: Draws | None) -> PickTolerances:
         """The widest tolerances that keep the demands; with ``draws``, the interval has the errors of the surfaces."""
         widest = self._widest(demands, draws)
         grades = {} if self.scene is None else grades_of(self.study, self.scene, self.point, widest.half_widths)

@@ -52,7 +52,7 @@ from doe.workflow.robust import Robust, check_robust, judge
 from doe.workflow.runs import Runs, with_remaining
 from doe.workflow.status import DESIGN, FRONT, STEPS_S, TOLERANCES, inputs_digest, shorter_by, study_stages
 from doe.workflow.surfaces import PublishedComparison, compare_with_published, fit_surfaces, reference_runs, with_rivals
-from doe.workflow.tolerances import PickTolerances, widest_tolerances_of
+from doe.workflow.tolerances import PickParts, PickTolerances
 from rbdyn.base.arrays import Array, one_thread
 from rbdyn.base.faults import InputError, MethodError, check_all
 from rbdyn.base.notes import Note, Notes
@@ -473,10 +473,10 @@ def _tolerances(study: Problem, searched: Adaptive | None, confirmed: Mapping[st
         return None
     scene = study.confirmation_scene(pick.point)
     if searched is None:
-        return widest_tolerances_of(study, pick.point, settings, confirmed, scene=scene)
+        return PickParts(study, pick.point, settings, confirmed, scene=scene).widest()
     neighbours = neighbourhood(study, searched, study.coded(pick.point)[None], pick.values[None])
     draws = draws_about(study, searched, neighbours, pick, confirmed["baseline"])
-    return widest_tolerances_of(study, pick.point, settings, confirmed, neighbours, draws, scene)
+    return PickParts(study, pick.point, settings, confirmed, neighbours, draws, scene).widest()
 
 
 def _compared(study: Problem, runs: Runs, reference: Runs) -> dict[str, PublishedComparison]:

@@ -11,7 +11,7 @@ from doe.cli import app
 from doe.study_file.sections import Tolerances
 from doe.workflow.front import find_front
 from doe.workflow.front_record import SurfaceFront
-from doe.workflow.tolerances import widest_tolerances_of
+from doe.workflow.tolerances import PickParts
 from rbdyn.base.faults import InputError
 from rbdyn.base.words import with_error
 
@@ -192,7 +192,7 @@ def test_widest_tolerances_of_a_study_keep_what_they_say(tmp_path):
     study = edited_study(tmp_path, *TOLERANCES)
     surfaces = table_surfaces(study)
     point = np.array([0.0136, 0.184, 0.301])
-    found = widest_tolerances_of(study.with_surfaces(surfaces), point, Tolerances(gains=study.responses))
+    found = PickParts(study.with_surfaces(surfaces), point, Tolerances(gains=study.responses)).widest()
     ratios = list(study.known_tolerances.values())
     assert found.half_widths / ratios == pytest.approx([found.half_widths[0] / ratios[0]] * 3)
     # Counted afresh: parts that keep half of every gain.

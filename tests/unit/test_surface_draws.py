@@ -24,7 +24,7 @@ from doe.workflow.surfaces import (
     half_widths,
     residual_correlation,
 )
-from doe.workflow.tolerances import widest_tolerances_of
+from doe.workflow.tolerances import PickParts
 
 DESIGN = central_composite(3, centre_replicates=6).coded
 TERMS = ("1", "A", "B", "C", "AB", "AC", "BC", "A^2", "B^2", "C^2")
@@ -161,9 +161,7 @@ def stated_and_true(study, random, noise, samples):
     units = {"centre": study.centre, "step": study.step}
     surfaces = [fit(coded, column, name=name, **units) for name, column in zip(study.responses, values.T, strict=True)]
     point = study.actual(np.array([-0.5, 0.9, -0.8]))
-    found = widest_tolerances_of(
-        study.with_surfaces(surfaces), point, Tolerances(samples=samples, gains=study.responses)
-    )
+    found = PickParts(study.with_surfaces(surfaces), point, Tolerances(samples=samples, gains=study.responses)).widest()
     base, nominal = (np.array([each.predict(study.coded(at)) for each in surfaces]) for at in (study.baseline, point))
     keep = np.where(base > nominal, 0.5 * (base - nominal), base - nominal)
     parts = study.coded(point + found.half_widths * random_offsets(20_000, 3, "normal", 99))

@@ -23,7 +23,7 @@ from doe.workflow.front import draws_of
 from doe.workflow.parts import FINER, Part, PartWidth, SharedTolerance, clearance_parts, grade_of_parts, grades_of
 from doe.workflow.runs import Runs
 from doe.workflow.surfaces import fit_surfaces
-from doe.workflow.tolerances import widest_tolerances_of
+from doe.workflow.tolerances import PickParts
 from rbdyn.base.faults import InputError
 from rbdyn.base.terminal import text
 from rbdyn.scene import Scene
@@ -53,9 +53,9 @@ def widest(planes, confirmed=None, point=PICK, **settings):
     study = study.with_surfaces(surfaces)
     settings = {"distribution": "uniform", "samples": 10_000} | settings
     few = draws_of(study, confirmed, 2)
-    return widest_tolerances_of(
-        study, study.actual(point), Tolerances(**settings), confirmed, search_draws=few, scene=Scene.load(EXAMPLE)
-    )
+    return PickParts(
+        study, study.actual(point), Tolerances(**settings), confirmed or {}, search_draws=few, scene=Scene.load(EXAMPLE)
+    ).widest()
 
 
 def counted(found):

@@ -10,7 +10,7 @@ from doe.study_file.sections import Tolerances
 from doe.workflow.problem import Problem
 from doe.workflow.runs import Runs
 from doe.workflow.surfaces import fit_surfaces
-from doe.workflow.tolerances import widest_tolerances_of
+from doe.workflow.tolerances import PickParts
 
 
 @pytest.mark.parametrize(
@@ -40,7 +40,7 @@ def test_closed_form_tolerance_beside_a_whole_number(tmp_path):
     values = np.outer(coded[:, 1], [3.0, -0.2, 10.0]) + np.array([10.0, 1.0, 50.0]) + noise
     surfaces = fit_surfaces(study, Runs(coded, study.actual(coded), values, np.full_like(values, np.nan)))
     settings = Tolerances(distribution="uniform", samples=100_000)
-    found = widest_tolerances_of(study.with_surfaces(surfaces), study.actual(np.array([0.0, -0.5, 0.0])), settings)
+    found = PickParts(study.with_surfaces(surfaces), study.actual(np.array([0.0, -0.5, 0.0])), settings).widest()
     assert np.isnan(found.half_widths[0])
     assert found.half_widths[1] == pytest.approx(0.25 / 0.9 * 0.05, rel=0.01)
     assert found.half_widths[2] == pytest.approx(found.half_widths[1] * 0.005 / 0.02)

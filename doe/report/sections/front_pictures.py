@@ -7,11 +7,10 @@ run was spent and why. ``front.js`` adds the marked point, which it finds by the
 import json
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import combinations
 from textwrap import fill
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from doe.report.still import COLOURS, SMALL, Point, Still, name_marks
@@ -123,8 +122,8 @@ class Fronts:
 
     sets: Sequence[Front]
     marks: Mapping[str, FrontPoint]
-    confirmed: Mapping[str, ConfirmedPoint] = MappingProxyType({})
-    limits: Mapping[str, Sequence[float]] = MappingProxyType({})
+    confirmed: Mapping[str, ConfirmedPoint] = field(default_factory=dict)
+    limits: Mapping[str, Sequence[float]] = field(default_factory=dict)
 
     @property
     def points(self) -> list[FrontPoint]:
