@@ -6,4 +6,4 @@
 """
 
 from doe.adaptive.emulators import Evaluate, Runs
-from doe.adaptive.search import AdaptiveFront, Batch, Border, Plan, adaptive_front
+from doe.adaptive.search import AdaptiveFront, AdaptiveSearch, Batch, Border, Plan

@@ -10,6 +10,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from itertools import product
 from typing import NamedTuple
 
@@ -148,36 +149,6 @@ class AdaptiveFront:
     seconds: float
 
 
-@one_thread
-def adaptive_front(
-    evaluate: Evaluate,
-    centre: Array,
-    step: Array,
-    region: Region,
-    design: Runs,
-    goals: Goals,
-    plan: Plan,
-    baseline: Array,
-    watch: Watch = lambda state, runs, budget: None,
-    border: Border | None = None,
-) -> AdaptiveFront:
-    """Find the front; the same seed and the same runs give the same bits.
-
-    ``centre`` and ``step`` (k,) turn coded units into those of the factors, which ``evaluate`` and the ``baseline`` have.
-    ``design`` are the first runs. The region may grow as far as the ``border``, not at all without one.
-
-    Raises MethodError where the budget has no room for the design, a batch and the fresh runs, or too few runs go well;
-    InfeasibleError where no run comes near to keeping the limits.
-    """
-    check_budget(plan, len(design.points))
-    limits = border or region
-    shares = shares_of(centre, step, limits.low, limits.high)
-    why = ["design"] * len(design.points)
-    search = _Search(evaluate, centre, step, region, goals, plan, design, watch, border, shares, why=why)
-    stopped = search.spend()
-    return search.finish(baseline, stopped)
-
-
 def check_budget(plan: Plan, design: int) -> None:
     """Raises MethodError where the budget has no room for the runs of the design, a batch and the fresh runs."""
     searched = design + plan.batch
@@ -203,19 +174,24 @@ class _Finals(NamedTuple):
 
 
 @dataclass(eq=False)
-class _Search:
-    """A search under way; ``runs`` are all so far, failed ones too; ``residuals`` are those of every batch to its predictions."""
+class AdaptiveSearch:
+    """A search for the front; the same seed and the same runs give the same bits.
+
+    ``centre`` and ``step`` (k,) turn coded units into those of the factors, which ``evaluate`` and the ``baseline`` have.
+    ``runs`` are those of the design at first, then all so far, failed ones too; ``residuals`` are those of every batch to its
+    predictions. The region may grow as far as the ``border``, not at all without one.
+    """
 
     evaluate: Evaluate
     centre: Array
     step: Array
     region: Region
+    runs: Runs
     goals: Goals
     plan: Plan
-    runs: Runs
-    watch: Watch
-    border: Border | None
-    shares: tuple[float, ...]
+    baseline: Array
+    watch: Watch = lambda state, runs, budget: None
+    border: Border | None = None
     history: list[Batch] = field(default_factory=list)
     fronts: list[Array] = field(default_factory=list)
     why: list[str] = field(default_factory=list)
@@ -223,6 +199,23 @@ class _Search:
     residuals: list[Array] = field(default_factory=list)
     emulators: Emulators | None = None
     seconds: float = 0.0
+
+    @one_thread
+    def front(self) -> AdaptiveFront:
+        """Find the front.
+
+        Raises MethodError where the budget has no room for the design, a batch and the fresh runs, or too few runs go well;
+        InfeasibleError where no run comes near to keeping the limits.
+        """
+        check_budget(self.plan, len(self.runs.points))
+        self.why = ["design"] * len(self.runs.points)
+        return self.finish(self.spend())
+
+    @cached_property
+    def shares(self) -> tuple[float, ...]:
+        """Shares of the steps in the centre for factors whose logarithms may be emulated."""
+        limits = self.border or self.region
+        return shares_of(self.centre, self.step, limits.low, limits.high)
 
     def spend(self) -> str:
         """Make batches until the budget is spent or nothing is left to gain; returns which."""
@@ -325,10 +318,10 @@ class _Search:
         values, errors, freedom = self.evaluate(self.centre + self.step * points, replicates)
         return Runs(points, values, errors, freedom, replicates)
 
-    def finish(self, baseline: Array, stopped: str) -> AdaptiveFront:
+    def finish(self, stopped: str) -> AdaptiveFront:
         """Fresh runs at the finalists, and the front by all runs together."""
         random = np.random.default_rng([self.plan.seed, len(self.history), 1])
-        finals = self._finals((baseline - self.centre) / self.step, random)
+        finals = self._finals((self.baseline - self.centre) / self.step, random)
         if not finals.runs.good.any():
             raise MethodError("every run at the finalists failed; see the failures of the runs")
         started = time.perf_counter()

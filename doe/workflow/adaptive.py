@@ -12,7 +12,7 @@ import numpy as np
 from scipy.stats import qmc
 
 from doe import clearance
-from doe.adaptive import AdaptiveFront, Batch, Border, Plan, adaptive_front
+from doe.adaptive import AdaptiveFront, AdaptiveSearch, Batch, Border, Plan
 from doe.adaptive import Runs as SearchRuns
 from doe.adaptive.emulators import Region
 from doe.adaptive.search import NEAR, Face, check_budget
@@ -111,22 +111,12 @@ def find_adaptive(study: Problem, runs: Runs, simulations: Simulations) -> Adapt
     plan, goals, start_s = plan_of(study), study.goals, time.perf_counter()
     first_runs = _design_runs(study, runs)
     evaluator = _PointEvaluator(study, simulations, plan.budget - len(first_runs.points))
-    region = region_in_units(study)
-    step = study.half_ranges
+    region, step, border = region_in_units(study), study.half_ranges, border_of(study)
     with named_faults(study, goals, lambda point: point, ""):
         try:
-            search = adaptive_front(
-                evaluator,
-                study.centre,
-                step,
-                region,
-                first_runs,
-                goals,
-                plan,
-                study.baseline,
-                evaluator.report,
-                border_of(study),
-            )
+            search = AdaptiveSearch(
+                evaluator, study.centre, step, region, first_runs, goals, plan, study.baseline, evaluator.report, border
+            ).front()
         except InfeasibleError:
             raise
         except MethodError as error:

@@ -14,7 +14,7 @@ from direct_search import direct_front
 from scipy import ndimage
 from scipy.stats import qmc
 
-from doe.adaptive import Plan, Runs, adaptive_front
+from doe.adaptive import AdaptiveSearch, Plan, Runs
 from doe.adaptive.emulators import Region
 from doe.pareto.search import Goals, best_for_hypervolume, hypervolume, non_dominated, spread
 
@@ -79,7 +79,7 @@ def search(function, seed, budget=80, first=16, goals=None, factors=FACTORS, noi
     design, zero, one = first_runs(evaluate, factors, first, seed), np.zeros(factors), np.ones(factors)
     goals = goals or Goals.of(["min"] * design.values.shape[1])
     settings = Plan(budget, **{"seed": seed, "least": 1, "most": 1, "usual": 1, **plan})
-    return adaptive_front(evaluate, zero, one, box(factors), design, goals, settings, zero)
+    return AdaptiveSearch(evaluate, zero, one, box(factors), design, goals, settings, zero).front()
 
 
 def share(problem, points):

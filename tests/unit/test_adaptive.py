@@ -11,7 +11,7 @@ from coarse_search import coarsely
 from known_fronts import box, first_runs, noisy, search
 from scipy import special
 
-from doe.adaptive import Batch, Border, Plan, adaptive_front
+from doe.adaptive import AdaptiveSearch, Batch, Border, Plan
 from doe.adaptive.emulators import (
     Dominance,
     Region,
@@ -234,7 +234,7 @@ def test_replicates_are_made_where_they_matter():
 
     design = first_runs(evaluate, 2, 12, 1)
     plan = Plan(60, least=2, most=16, usual=5)
-    found = adaptive_front(evaluate, np.zeros(2), np.ones(2), box(2), design, TWO, plan, np.zeros(2))
+    found = AdaptiveSearch(evaluate, np.zeros(2), np.ones(2), box(2), design, TWO, plan, np.zeros(2)).front()
     searched, fresh = asked[1 : len(found.history)], asked[len(found.history) :]
     spent = np.concatenate(searched)
     assert spent.min() >= 2
@@ -255,7 +255,7 @@ def test_unit_a_region_of_few_points_is_searched_to_its_end(levels):
     ones = np.ones(len(points), dtype=np.int64)
     design = Runs(points, *evaluate(points, ones), ones)
     plan = Plan(40, least=1, most=1, usual=1)
-    found = adaptive_front(evaluate, zero, np.ones(2), region, design, TWO, plan, zero)
+    found = AdaptiveSearch(evaluate, zero, np.ones(2), region, design, TWO, plan, zero).front()
     assert "no point is left" in found.stopped and len(found.front.points) >= 1
     assert region.twins(found.front.points, points).all()
 
@@ -269,7 +269,7 @@ def beyond(border, budget=70):
     evaluate = noisy(shifted, 1, 0.02)
     design, plan = first_runs(evaluate, 2, 12, 1), Plan(budget, least=1, most=1, usual=1)
     zero, one = np.zeros(2), np.ones(2)
-    return adaptive_front(evaluate, zero, one, box(2), design, TWO, plan, zero, border=border)
+    return AdaptiveSearch(evaluate, zero, one, box(2), design, TWO, plan, zero, border=border).front()
 
 
 @pytest.mark.usefixtures("coarse")

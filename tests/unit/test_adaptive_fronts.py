@@ -18,7 +18,7 @@ from known_fronts import (
     zdt1,
 )
 
-from doe.adaptive import Plan, adaptive_front
+from doe.adaptive import AdaptiveSearch, Plan
 from doe.adaptive.emulators import Region, Runs
 from doe.designs import central_composite
 
@@ -61,5 +61,5 @@ def bearing_search(seed, budget=100):
     def at(points, replicates):
         return evaluate((points - centre) / half, replicates)
 
-    found = adaptive_front(at, centre, half, region, design, THREE, Plan(budget, seed=seed), centre)
+    found = AdaptiveSearch(at, centre, half, region, design, THREE, Plan(budget, seed=seed), centre).front()
     return (found.front.points - centre) / half
