@@ -323,10 +323,10 @@ def stated_part(link: Link, by_name: Mapping[str, Link]) -> Part:
         per_kelvin = growth.expansion_per_K * by_name[growth.of].nominal
         nominal = per_kelvin * growth.temperature_rise_K
         lower, upper = (_rounded(end) for end in sorted((per_kelvin * growth.lower_K, per_kelvin * growth.upper_K)))
-        return _part(link, nominal, lower, upper, mean, origin="temperature")
+        return replace(_part(link, nominal, lower, upper, mean), origin="temperature")
     if link.fit is not None:
         lower, upper = (_rounded(end) for end in coded_limits(link))
-    return _part(link, nominal, lower, upper, mean, fit=link.fit)
+    return replace(_part(link, nominal, lower, upper, mean), fit=link.fit)
 
 
 def stated_parts(links: Sequence[Link]) -> list[Part]:
@@ -346,40 +346,17 @@ def allocated_part(link: Link, tolerance: float, grade: str | None, slope: float
         lower, upper = (-tolerance, 0.0) if slope > 0 else (0.0, tolerance)
     else:
         lower, upper = position_limits(link.nominal, link.position, tolerance)
-    return _part(link, link.nominal, _rounded(lower), _rounded(upper), None, grade=grade, origin="allocated")
+    return replace(_part(link, link.nominal, _rounded(lower), _rounded(upper)), grade=grade, origin="allocated")
 
 
 def _rounded(size: float) -> float:
     return round(size, DIGITS)
 
 
-def _part(
-    link: Link,
-    nominal: float,
-    lower: float,
-    upper: float,
-    mean: float | None,
-    *,
-    grade: str | None = None,
-    origin: Origin = "stated",
-    fit: str | None = None,
-) -> Part:
+def _part(link: Link, nominal: float, lower: float, upper: float, mean: float | None = None) -> Part:
     mean = (upper + lower) / 2 if mean is None else mean
-    law, capability = link.distribution, link.capability
-    return Part(
-        link.name,
-        link.coefficient,
-        nominal,
-        upper,
-        lower,
-        law,
-        mean,
-        grade,
-        capability,
-        origin=origin,
-        fit=fit,
-        estimated=link.estimated,
-    )
+    part = Part(link.name, link.coefficient, nominal, upper, lower, link.distribution, mean)
+    return replace(part, capability=link.capability, estimated=link.estimated)
 
 
 def on_step(steps: int, resolution: float) -> float:
