@@ -423,9 +423,7 @@ class AdaptiveSearch:
         base_values = finals.base.values[0] if finals.base.good.all() else None
         picks, among = pick_all(predicted_costs, goals, None if base_values is None else goals.costs(base_values))
         span = np.ptp(costs, axis=0)
-        every = self.runs.plus(finals.runs).plus(finals.base)
-        actual = [self.centre + self.step * part.points for part in (runs, self.runs, every)]
-        failed = actual[2][~every.good]
+        actual = [self.centre + self.step * part.points for part in (runs, self.runs)]
         return SimulatedFront(
             points=actual[0],
             values=values,
@@ -436,10 +434,6 @@ class AdaptiveSearch:
             pick=picks[self.plan.pick],
             pick_reason=f"{NAMES[self.plan.pick]} {among}",
             baseline_values=base_values,
-            repeats=1,
-            failures=np.unique(failed, axis=0),
-            evaluations=len(every.points),
-            generations=len(self.history),
             seed=self.plan.seed,
             goals=goals,
             searched=Samples(actual[1], self.runs.values, self.runs.errors),

@@ -312,10 +312,9 @@ class Samples(NamedTuple):
 class SimulatedFront:
     """Front of a noisy simulator, in ascending order of the first cost at selection.
 
-    ``points`` (f, k); ``values`` and ``standard_errors`` (f, m) of ``repeats`` fresh runs each, with their ``costs`` and
+    ``points`` (f, k); ``values`` and ``standard_errors`` (f, m) of their fresh runs, with their ``costs`` and
     ``cost_errors`` (f, q). The fresh runs had no part in the selection. ``optimism`` (q,): mean excess of these costs over
-    those of the search, in shares of their range. ``searched``: all runs of the search. ``pick``: a row. ``failures`` (x, k):
-    points with a failed run. ``freedom`` (f, m): degrees of freedom of the standard errors, by default infinite.
+    those of the search, in shares of their range. ``searched``: all runs of the search. ``pick``: a row. ``freedom`` (f, m): degrees of freedom of the standard errors, by default infinite.
     """
 
     points: Array
@@ -327,10 +326,6 @@ class SimulatedFront:
     pick: int
     pick_reason: str
     baseline_values: Array | None
-    repeats: int
-    failures: Array
-    evaluations: int
-    generations: int
     seed: int
     goals: Goals
     searched: Samples

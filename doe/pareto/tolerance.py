@@ -235,11 +235,10 @@ class SimulatedAware:
     nominal baseline. Both are None without a simulated baseline.
     """
 
-    box: ToleranceBox
     costs: Array
     violations: Array
-    robust_baseline: Array | None
-    survives: Array | None
+    robust_baseline: Array | None = None
+    survives: Array | None = None
 
 
 def simulated_aware(
@@ -249,11 +248,10 @@ def simulated_aware(
     offsets = _offsets(box)
     judged = box.judge_parts(here.parts(offsets), goals, below, above)
     if baseline is None:
-        return SimulatedAware(box, judged.costs, judged.violations, None, None)
+        return SimulatedAware(judged.costs, judged.violations)
     nominal = goals.costs(baseline.values)[0]
     survival_offsets = box.half * even_offsets(SURVIVAL_PARTS, box.half.size, box.distribution)
     return SimulatedAware(
-        box=box,
         costs=judged.costs,
         violations=judged.violations,
         robust_baseline=box.judge_parts(baseline.parts(offsets), goals).costs[0],

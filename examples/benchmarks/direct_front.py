@@ -17,7 +17,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from direct_search import SurrogateLoss, compare_with_surrogate, direct_front, relative_hypervolumes, repeated
+from direct_search import (
+    DirectFront,
+    SurrogateLoss,
+    compare_with_surrogate,
+    direct_front,
+    relative_hypervolumes,
+    repeated,
+)
 
 from doe.clearance import Simulations
 from doe.pareto import ParetoFront
@@ -71,7 +78,7 @@ class Direct:
     search and of the comparison.
     """
 
-    front: SimulatedFront
+    front: DirectFront
     surrogate_points: Array
     surrogate_values: Array
     surrogate_errors: Array

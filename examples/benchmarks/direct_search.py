@@ -39,6 +39,16 @@ SELECTING = 4  # fresh runs a candidate
 REPORTING = 4  # fresh runs a finalist at least
 
 
+@dataclass(frozen=True, eq=False, kw_only=True)
+class DirectFront(SimulatedFront):
+    """A front with ``repeats`` fresh runs a point, the points of failed runs (x, k), and the effort of its search."""
+
+    repeats: int
+    failures: Array
+    evaluations: int
+    generations: int
+
+
 def direct_front(
     evaluate: Evaluate,
     lower: ArrayLike,
@@ -52,7 +62,7 @@ def direct_front(
     confidence: float = 0.95,
     resample: float = 0.3,
     pick: Rule = "knee",
-) -> SimulatedFront:
+) -> DirectFront:
     """Find the front of a noisy simulator; the same seed and the same runs give the same bits.
 
     evaluate : runs points (n, k), a generation at once, and gives responses (n, m) and their standard errors (n, m),
@@ -88,7 +98,7 @@ def direct_front(
     picks, among = pick_all(goals.costs(fresh.values[chosen][sound]), goals, base_costs)
     costs = goals.costs(ours.values)
     span = np.ptp(costs, axis=0)
-    return SimulatedFront(
+    return DirectFront(
         *ours,
         costs=costs,
         cost_errors=ours.errors[:, goals.objectives],

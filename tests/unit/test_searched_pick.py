@@ -35,10 +35,11 @@ def test_worst_case_of_a_slope_is_its_corner_and_limits_count_it():
     here = Neighbourhood(FLAT, np.zeros((1, 2)), np.array([[11.0, 5.0]]), slopes)
     base = Neighbourhood(FLAT, np.zeros((1, 2)), np.array([[20.0, 6.0]]), slopes)
     none = np.zeros((1, 2))
-    found = simulated_aware(ToleranceBox(np.array([1.0, 0.5]), "worst_case"), here, goals, base, none, none)
+    box = ToleranceBox(np.array([1.0, 0.5]), "worst_case")
+    found = simulated_aware(box, here, goals, base, none, none)
     assert found.costs[0] == pytest.approx([13.5, 5.0]) and found.violations[0] == pytest.approx([0.0])
     assert found.survives[0] == 1.0 and found.robust_baseline == pytest.approx([22.5, 6.0])
-    doubted = simulated_aware(found.box, here, goals, base, none, none + 1.0)
+    doubted = simulated_aware(box, here, goals, base, none, none + 1.0)
     assert doubted.violations[0] == pytest.approx([1.0])
 
 
