@@ -132,9 +132,9 @@ def _by_run(
     runs: Sequence[Run], labels: Sequence[str], points: Sequence[Point], results: Sequence[SimulationResult | Failure]
 ) -> list[Simulated | Failure]:
     """Results of runs from those of all their points."""
-    rest = zip(points, results, strict=True)
+    pairs = zip(points, results, strict=True)
     return [
-        result_of(run, label, list(islice(rest, len(labelled_scenes(run)))))
+        result_of(run, label, list(islice(pairs, len(labelled_scenes(run)))))
         for run, label in zip(runs, labels, strict=True)
     ]
 

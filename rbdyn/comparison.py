@@ -161,8 +161,8 @@ class Comparison(Brief, SavedRecord, kw_only=True):
     def brief(self) -> tuple[str, list[Figure]]:
         """Number of inputs that differ; the differences of the figures."""
         figures = [
-            Figure(words, one.difference, one.error_together, unit)
-            for name, one in self.figures.items()
+            Figure(words, figure.difference, figure.error_together, unit)
+            for name, figure in self.figures.items()
             for words, unit in (quantity(name),)
         ]
         return f"{self.b.name} less {self.a.name}, {counted(len(self.inputs), 'input')} differ", figures
@@ -220,26 +220,26 @@ def comparison(a: Any, b: Any, name_a: str = "A", name_b: str = "B") -> Comparis
     sides = [
         Side(
             name,
-            full_status(one),
-            one.scene,
-            one.versions,
-            getattr(one, "seed", None),
-            getattr(one, "replicates", None),
+            full_status(result),
+            result.scene,
+            result.versions,
+            getattr(result, "seed", None),
+            getattr(result, "replicates", None),
         )
-        for name, one in ((name_a, a), (name_b, b))
+        for name, result in ((name_a, a), (name_b, b))
     ]
     from rbdyn.dynamics.figures import repeated
 
     figures = [_figures(a), _figures(b)]
     repeats = repeated(*figures)
-    failed = [f"{place}: {full_status(one)}" for place, one in (("A", a), ("B", b)) if one.status != "ok"]
+    failed = [f"{place}: {full_status(result)}" for place, result in (("A", a), ("B", b)) if result.status != "ok"]
     return Comparison(
         status="; ".join(failed) or "ok",
         kind=_kind(a),
         a=sides[0],
         b=sides[1],
         inputs=different_inputs(a.scene, b.scene),
-        figures=differences(*({key: one[key] for key in one if key not in repeats} for one in figures)),
+        figures=differences(*({key: result[key] for key in result if key not in repeats} for result in figures)),
         parts=differences(_parts(a), _parts(b)),
         notes=_notes(a, b),
     )
@@ -251,8 +251,8 @@ def differences(first: Mapping[str, Quantity], second: Mapping[str, Quantity]) -
     ours, theirs = [first[name] for name in common], [second[name] for name in common]
     error, wide = errors_of_differences(arrays_of(ours), arrays_of(theirs))
     found = {
-        name: _difference(one.value, other.value, float(half), float(together))
-        for name, one, other, half, together in zip(common, ours, theirs, error, wide, strict=True)
+        name: _difference(a_value.value, b_value.value, float(half), float(together))
+        for name, a_value, b_value, half, together in zip(common, ours, theirs, error, wide, strict=True)
     }
     for figures, place in ((first, "A"), (second, "B")):
         for name in figures.keys() - found.keys():

@@ -453,8 +453,8 @@ def nothing_gained(history: Sequence[Batch], since: int) -> bool:
 def residuals_of(emulators: Emulators, runs: Runs) -> Array:
     """Residuals (n, m) of runs that the emulators were not fitted to, in standard deviations of the two together."""
     means, deviations = emulators.predict(runs.points)
-    own = emulators.scatter(runs.points) / runs.replicates[:, None] + emulators.nuggets()
-    return np.asarray((runs.values - means) / np.sqrt(deviations**2 + own))
+    scatter = emulators.scatter(runs.points) / runs.replicates[:, None] + emulators.nuggets()
+    return np.asarray((runs.values - means) / np.sqrt(deviations**2 + scatter))
 
 
 def as_predicted(emulators: Emulators, runs: Runs) -> bool:

@@ -217,17 +217,17 @@ def limits_of(texts: Sequence[str]) -> Limits:
         except MethodError as error:
             faults.append(f"{where}: {one_line(number, LONGEST_NAME)} {error}")
             continue
-        own, bound = limits.setdefault(name, {}), BOUNDS[sign]
+        bounds, bound = limits.setdefault(name, {}), BOUNDS[sign]
         if not math.isfinite(value):
             faults.append(f"{where}: {number} is not a finite number; write a plain number")
-        elif bound in own:
-            faults.append(f"{where}: {name} has the {bound} limit {own[bound]:g} already; keep one of them")
+        elif bound in bounds:
+            faults.append(f"{where}: {name} has the {bound} limit {bounds[bound]:g} already; keep one of them")
         else:
-            own[bound] = value
+            bounds[bound] = value
     faults += [
-        f"--limit {name}: the lower limit {own['lower']:g} is not below the upper limit {own['upper']:g}; swap or widen them"
-        for name, own in limits.items()
-        if len(own) == 2 and own["lower"] >= own["upper"]
+        f"--limit {name}: the lower limit {bounds['lower']:g} is not below the upper limit {bounds['upper']:g}; swap or widen them"
+        for name, bounds in limits.items()
+        if len(bounds) == 2 and bounds["lower"] >= bounds["upper"]
     ]
     refuse(faults)
     return limits

@@ -205,11 +205,11 @@ def evaluate(
     region, reach = _where(points, region, reach)
     # The memory has a row a run, so that sums over columns have the same bits on every path.
     matrix, contrasts = np.ascontiguousarray(model_matrix(points, terms)), block_contrasts(groups)
-    whole = np.column_stack([matrix, contrasts])
+    extended = np.column_stack([matrix, contrasts])
     size = matrix.shape[1]
-    covariance = np.asarray(np.linalg.inv(whole.T @ whole)[:size, :size], float)
+    covariance = np.asarray(np.linalg.inv(extended.T @ extended)[:size, :size], float)
     freedom = _degrees_of_freedom(points, groups, size, contrasts.shape[1])
-    orthogonal = np.linalg.qr(whole)[0]
+    orthogonal = np.linalg.qr(extended)[0]
     return Evaluation(
         terms=list(terms),
         runs=runs,

@@ -172,10 +172,10 @@ class Exchange:
         weighted = ahead @ self.moments
         of_new, both = (weighted * ahead).sum(axis=-1), np.einsum("scj,sj->sc", weighted, behind)
         of_old = ((behind @ self.moments) * behind).sum(axis=-1)[:, None]
-        whole = (inverse * self.moments).sum(axis=(-1, -2))[:, None]
+        variance = (inverse * self.moments).sum(axis=(-1, -2))[:, None]
         less = (1.0 - at_old) * of_new + 2.0 * between * both - (1.0 + at_new) * of_old
         estimable = ratio > RIDGE
-        return np.where(estimable, less / (whole * np.where(estimable, ratio, 1.0)), -1.0)
+        return np.where(estimable, less / (variance * np.where(estimable, ratio, 1.0)), -1.0)
 
 
 @dataclass(frozen=True, eq=False)

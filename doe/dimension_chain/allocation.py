@@ -243,22 +243,22 @@ class Allocation:
         fixed = total([abs(slopes[part.name]) * part.tolerance_mm for part in bare], mode)
         width = self.chain.width_mm
         # A nonlinear chain may have more room than its tangent: any positive width can start the search.
-        rest = sqrt(max(width**2 - fixed**2, 0.0)) if mode == "rss" else width - fixed
-        rest = rest if rest > 0 else width
+        budget = sqrt(max(width**2 - fixed**2, 0.0)) if mode == "rss" else width - fixed
+        budget = budget if budget > 0 else width
         idle = [link.name for link in free if slopes[link.name] == 0]
         if idle and (rule.method == "cost" or len(idle) == len(free)):
             raise MethodError(f'"{idle[0]}" does not change the closing link; fix it')
         if rule.method == "cost":
             curves = [link.cost for link in free if link.cost is not None]
             try:
-                widths = cheapest(curves, [slopes[link.name] for link in free], rest, mode)
+                widths = cheapest(curves, [slopes[link.name] for link in free], budget, mode)
             except MethodError:
                 # A yield may have room where the root sum square has none.
                 widths = [self.least[link.name] for link in free]
             return {link.name: t for link, t in zip(free, widths, strict=True)}
         iso = rule.method == "iso286"
         weights = {link.name: tolerance_unit(link.nominal) if iso else 1.0 for link in free}
-        share = rest / total([abs(slopes[name]) * weight for name, weight in weights.items()], mode)
+        share = budget / total([abs(slopes[name]) * weight for name, weight in weights.items()], mode)
         return {name: share * weight for name, weight in weights.items()}
 
     def _scale(self, rule: Tolerances) -> float:

@@ -243,9 +243,9 @@ def _function(link: Link, by_name: Mapping[str, Link]) -> Callable[[Sizes], Any]
     if link.press_fit:
         return _press_fit(link.press_fit, by_name[link.press_fit.bore].nominal)
     if link.thermal_growth:
-        name, of = link.name, link.thermal_growth.of
-        nominal = by_name[of].nominal
-        return lambda sizes: sizes[name] * sizes[of] / nominal
+        name, grown = link.name, link.thermal_growth.of
+        nominal = by_name[grown].nominal
+        return lambda sizes: sizes[name] * sizes[grown] / nominal
     text = link.expression or ""
     return lambda sizes: evaluate(text, sizes)
 
@@ -307,11 +307,11 @@ def _worst_case(function: ClosingFunction, parts: Sequence[Part]) -> Interval:
     straight = [part for part in parts if part.name not in function.arguments]
     ends = []
     for sign in (1, -1):
-        rest = 0.0
+        end = 0.0
         for part in straight:
             coefficient = function.coefficients[part.name]
-            rest += coefficient * (part.nominal_mm + (part.lower_mm if sign * coefficient > 0 else part.upper_mm))
-        ends.append(rest + sign * _least(function, bent, sign))
+            end += coefficient * (part.nominal_mm + (part.lower_mm if sign * coefficient > 0 else part.upper_mm))
+        ends.append(end + sign * _least(function, bent, sign))
     return round(ends[0], DIGITS), round(ends[1], DIGITS)
 
 

@@ -156,9 +156,9 @@ def draw(
     values = np.empty(samples)
     starts = range(0, samples, CHUNK)
     streams = np.random.SeedSequence(seed).spawn(len(starts))
-    own = {part.distribution for part in parts}
+    distributions = {part.distribution for part in parts}
     # If all parts follow one of the laws, its assemblies serve for both.
-    shared = own.pop() if len(own) == 1 and own <= set(laws) else None
+    shared = distributions.pop() if len(distributions) == 1 and distributions <= set(laws) else None
     laws_by_key: Laws = {} if shared else {"as_given": None}
     laws_by_key |= {law: law for law in laws}
 
@@ -345,13 +345,13 @@ class SelectiveAssembly(Record):
     """Result of selective assembly.
 
     ``matched``: share of the parts that find a partner in their class. ``good``: share of the matched assemblies within the
-    limits, with its ``standard_error``; ``random``: that of random assemblies. ``whole``: total yield, matched times good.
+    limits, with its ``standard_error``; ``random``: that of random assemblies. ``total``: total yield, matched times good.
     ``worst_case_mm``: over all classes. ``edges_mm``: sizes between the classes. ``classes_needed``: least number of classes
     with a worst case within the limits, None above 100.
     """
 
     classes: int
-    whole: float = derived(lambda self: self.matched * self.good, "yield")
+    total: float = derived(lambda self: self.matched * self.good, "yield")
     matched: float
     good: float = keyed("good_of_matched")
     random: float

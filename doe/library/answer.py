@@ -124,9 +124,9 @@ class Answer(Mapping[str, Any]):
         return f"<{type(self).__name__}: {self.brief()}>"
 
     def _repr_html_(self) -> str:
-        first, *rest = (section for section in map(_still, self.sections()) if section.blocks)
+        first, *tail = (section for section in map(_still, self.sections()) if section.blocks)
         folded = (
-            f"<details><summary>{html.prose(section.title)}</summary>{_rendered(section)}</details>" for section in rest
+            f"<details><summary>{html.prose(section.title)}</summary>{_rendered(section)}</details>" for section in tail
         )
         return f"<div>{_rendered(first)}{''.join(folded)}</div>"
 

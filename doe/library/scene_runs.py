@@ -111,15 +111,15 @@ def run_answer(
     from rbdyn.base.page import REPORT_FILES, write_with_report
 
     content: Any = table if hasattr(table, "columns") else path_given(table, "table")
-    base, whole = optional_path(scene, "scene"), optional_path(out, "out")
+    base, target = optional_path(scene, "scene"), optional_path(out, "out")
     assignments, effort = (
         texts_given(overrides, "overrides", '["cage.mass_g=50"]'),
         Effort(workers, scheduler, retry, progress, notice),
     )
     share = part_given(part)
-    if share is not None and whole is None:
+    if share is not None and target is None:
         raise InputError([f"--part {part}: needs --out DIR, the folder that all parts share"])
-    folder = None if whole is None else part_folder(whole, share)
+    folder = None if target is None else part_folder(target, share)
     source = content if isinstance(content, Path) else None
     with ExitStack() as stack:
         output = stack.enter_context(output_folder(folder, "doe", (*RUN_FILES, *REPORT_FILES), force=force))
@@ -127,8 +127,8 @@ def run_answer(
         rows, digest = scenes.rows[rows_of(share)], table_digest(scenes)
         if not rows:
             raise InputError([f"--part {part}: has no row, since the table has {len(scenes.rows)}; name fewer parts"])
-        if whole is not None:
-            refuse_other_parts(whole, digest)
+        if target is not None:
+            refuse_other_parts(target, digest)
         output.claim(source, *([] if base is None else [base]))
         stack.enter_context(registered(source, folder) if source is not None else nullcontext())
         place = stack.enter_context(effort.folder(folder))

@@ -243,7 +243,7 @@ def study(
     return StudyAnswer(record, folder, tuple(record["files"]))
 
 
-def _part(path: Path, whole: Path, share: tuple[int, int], effort: Effort, force: bool) -> PartAnswer:
+def _part(path: Path, target: Path, share: tuple[int, int], effort: Effort, force: bool) -> PartAnswer:
     """The design runs of a part. Raises as ``study``."""
     from doe.running.queue import part_folder, refuse_other_parts
     from doe.running.store import Failure
@@ -251,11 +251,11 @@ def _part(path: Path, whole: Path, share: tuple[int, int], effort: Effort, force
     from doe.workflow.status import inputs_digest
     from doe.workflow.whole import run_part
 
-    folder = part_folder(whole, share)
+    folder = part_folder(target, share)
     with output_folder(folder, "doe", (), force=force) as output, registered(path, folder):
         loaded = Problem.load(path)
         digest = inputs_digest(loaded)
-        refuse_other_parts(whole, digest)
+        refuse_other_parts(target, digest)
         output.claim(path)
         with effort.agenda(folder, "doe study", inputs=digest) as agenda:
             results = run_part(loaded, folder, effort, share, agenda)

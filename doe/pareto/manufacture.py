@@ -209,8 +209,8 @@ def interval_of_share(hits: Array, parts: int) -> Interval:
     shares, behind = sample[order], np.cumsum(np.repeat(times, levels)[order])
     # For every lower end, the nearest upper end with enough probability.
     enough = np.searchsorted(behind, np.append(0, behind[:-1]) + LEVEL * behind[-1] * (1.0 - 1e-12))
-    whole = np.flatnonzero(enough < shares.size)
-    first = int(whole[np.argmin(shares[enough[whole]] - shares[whole])])
+    complete = np.flatnonzero(enough < shares.size)
+    first = int(complete[np.argmin(shares[enough[complete]] - shares[complete])])
     low, high = float(shares[first]), float(shares[enough[first]])
     # With no hits the interval starts at 0, with all hits it ends at 1 (Brown, Cai and DasGupta).
     none = special.betaincinv(0.5, parts + 0.5, quantiles[-1])

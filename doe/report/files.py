@@ -315,8 +315,8 @@ def response_surface(study: Problem, surface: Surface, path: Path) -> None:
         axis.set_xlabel(label(study.factors[0]), labelpad=8)
         axis.set_ylabel(label(study.factors[panel]), labelpad=8)
         axis.set_zlabel(response.label)
-        rest = [place for place in range(1, factors) if place != panel]
-        named = ((*quantity(study.factors[place]), study.centre[place]) for place in rest)
+        fixed = [place for place in range(1, factors) if place != panel]
+        named = ((*quantity(study.factors[place]), study.centre[place]) for place in fixed)
         fixed_factors = [f"{words} {centre:g} {unit}".rstrip() for words, unit, centre in named]
         notes = [*fixed_factors, *(f"limit {bound:g} in red" for bound in response.bounds)]
         axis.set_title(f"({'abcdefg'[panel - 1]}) {', '.join(notes)}", fontsize=10)

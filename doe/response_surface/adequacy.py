@@ -173,9 +173,9 @@ def ratio(a: float, b: float) -> float | None:
     return a / b if b > 0 and math.isfinite(a / b) else None
 
 
-def complement(part: float, whole: float) -> float | None:
+def complement(part: float, total: float) -> float | None:
     """1 - part / whole, or None where that is undefined."""
-    share = ratio(part, whole)
+    share = ratio(part, total)
     return None if share is None else 1.0 - share
 
 
@@ -257,9 +257,9 @@ def diagnose(solution: LeastSquares, response: Array) -> Diagnostics:
     safe = np.where(tested, free, 1.0)
     standardized = np.where(tested, solution.residuals / np.sqrt(safe * (solution.mean_square or 1.0)), np.nan)
     # A run with the whole residual leaves no scatter for its own test.
-    rest = solution.dof - standardized**2
-    judged = tested & (rest > EXACT * solution.dof) & (solution.dof > 1)
-    rescaled = standardized * np.sqrt(max(solution.dof - 1, 0) / np.where(judged, rest, 1.0))
+    deleted = solution.dof - standardized**2
+    judged = tested & (deleted > EXACT * solution.dof) & (solution.dof > 1)
+    rescaled = standardized * np.sqrt(max(solution.dof - 1, 0) / np.where(judged, deleted, 1.0))
     studentized = np.where(judged, rescaled, np.nan)
     cook = standardized**2 * solution.leverage / safe / len(solution.coefficients)
     prediction, runs = response - solution.residuals, range(1, len(response) + 1)
@@ -465,9 +465,9 @@ def model_error(
     return ModelError(beyond / share, dof, source) if share > 0.0 and dof > 0 and beyond > 0.0 else None
 
 
-def correlation(one: Array, other: Array) -> Array:
+def correlation(points: Array, others: Array) -> Array:
     """Correlation (n, l) of the model error at coded points (n, k) and (l, k)."""
-    apart = ((one[:, None, :] - other[None, :, :]) ** 2).sum(axis=-1)
+    apart = ((points[:, None, :] - others[None, :, :]) ** 2).sum(axis=-1)
     return np.exp(-apart / REACH**2)
 
 

@@ -71,10 +71,10 @@ def solve(matrix: ArrayLike, response: ArrayLike) -> LeastSquares:
     unit = columns / scale
     orthogonal, triangle = np.linalg.qr(unit)
     back = linalg.solve_triangular(triangle, np.eye(len(triangle)))
-    scaled, rest = _refinement(unit, values, orthogonal, back)
+    scaled, residuals = _refinement(unit, values, orthogonal, back)
     rounding = ROUNDING * np.linalg.norm(values)
-    if np.linalg.norm(rest) <= rounding:
-        rest = np.zeros_like(rest)
+    if np.linalg.norm(residuals) <= rounding:
+        residuals = np.zeros_like(residuals)
     scaled = np.where(np.abs(scaled) * np.linalg.norm(unit, axis=0) <= rounding, 0.0, scaled)
     inverse = (back @ back.T) / np.outer(scale, scale)
     dof = columns.shape[0] - columns.shape[1]
@@ -83,10 +83,10 @@ def solve(matrix: ArrayLike, response: ArrayLike) -> LeastSquares:
     return LeastSquares(
         coefficients=scaled / scale,
         inverse=inverse,
-        residuals=rest,
+        residuals=residuals,
         leverage=(orthogonal**2).sum(axis=1),
         inflation=np.where(varies, np.diag(inverse) * spread, np.nan),
-        mean_square=float((rest**2).sum() / dof),
+        mean_square=float((residuals**2).sum() / dof),
         dof=dof,
     )
 
@@ -104,11 +104,11 @@ def _refinement(columns: Array, target: Array, orthogonal: Array, back: Array) -
     The residuals of target = columns b + r and columns' r = 0 are exact sums, so that factors of ten digits give fifteen.
     """
     coefficients = back @ (orthogonal.T @ target)
-    rest = target - columns @ coefficients
-    open_values = _exact_sums(np.column_stack([target, -rest, -columns]), np.concatenate([[1.0, 1.0], coefficients]))
-    open_slopes = -_exact_sums(columns.T, rest)
+    defect = target - columns @ coefficients
+    open_values = _exact_sums(np.column_stack([target, -defect, -columns]), np.concatenate([[1.0, 1.0], coefficients]))
+    open_slopes = -_exact_sums(columns.T, defect)
     along = orthogonal.T @ open_values - back.T @ open_slopes
-    return coefficients + back @ along, rest + open_values - orthogonal @ along
+    return coefficients + back @ along, defect + open_values - orthogonal @ along
 
 
 def _exact_sums(rows: Array, factors: Array) -> Array:

@@ -360,12 +360,12 @@ def _terms(fit: Fit) -> str:
     listed = ", ".join(f"{source} ({p_text(p)})" for p, source in strong)
     if not strong:
         model = find(fit.anova, "model")
-        whole = (
+        regression = (
             f", but the model as a whole is (F = {model.f:.3g}, {p_text(model.p)})"
             if model.p is not None and model.p <= ALPHA
             else ""
         )
-        return f"no term alone is significant at {ALPHA:g}{whole}."
+        return f"no term alone is significant at {ALPHA:g}{regression}."
     if not weak:
         return f"significant at {ALPHA:g}: {listed}."
     return f"significant at {ALPHA:g}: {listed}; not significant: {', '.join(weak)}."

@@ -390,8 +390,8 @@ class Study:
             table = self._chain_of_file(chain.name, chain.file)
             return {**{key: content for key, content in table.items() if key != "name"}, "closing_link": limits}
         selective = {} if chain.selective is None else {"selective": chain.selective}
-        own = {"link": chain.link, "allocate": chain.allocate, "monte_carlo": chain.monte_carlo}
-        return {"closing_link": limits, **own, **selective}
+        parts = {"link": chain.link, "allocate": chain.allocate, "monte_carlo": chain.monte_carlo}
+        return {"closing_link": limits, **parts, **selective}
 
     def _chain_of_file(self, name: str, file: str) -> Mapping[str, Any]:
         """Table of the chain of that name in a file of chains."""

@@ -16,7 +16,7 @@ from rbdyn.base.tables.sheet import UNKNOWN, InputTable, Limits, listed, quoted,
 
 # Fourth powers of larger values overflow; larger labels and counts are not exact in floating point.
 RUN, ERROR = Limits(1e50, 1e-50), Limits(1e50, 1e-50, "not negative")
-NUMBERED, COUNTED = Limits(1e9, whole=True), Limits(1e9, sign="not negative", whole=True)
+NUMBERED, COUNTED = Limits(1e9, integer=True), Limits(1e9, sign="not negative", integer=True)
 COUNT, LABELS = "replicates", ("block", "run")
 # Column of a table by ``doe run`` with the outcome of each row, and what it says.
 STATUS, DONE, FAILED = "status", "done", "failed"

@@ -61,7 +61,7 @@ def implausibility(cells: Cells, measured: Measured, quantiles: Array) -> tuple[
     The others are the variances (n, k) of rig, integration and discrepancy by row."""
     learnt = measured.learnt
     mean, doubt = (prediction[:, learnt] for prediction in cells.predict(quantiles))
-    emulator = (doubt**2).sum(axis=2) + cells.rest[learnt]
+    emulator = (doubt**2).sum(axis=2) + cells.left_out[learnt]
     output = measured.output[learnt]
     apart, rig = np.abs(measured.values[learnt] - mean), measured.variances[learnt]
     by_row = rig + (BY_ROW * measured.scales[output]) ** 2
@@ -243,8 +243,8 @@ def _emulated(batch: Batch, measured: Measured, before: Cells | None) -> Cells:
 def _misfit(cells: Cells, trial: Batch) -> float:
     """Mean square of residuals of simulations from the emulators, in standard deviations of emulators and runs."""
     mean, doubt = cells.predict(trial.quantiles)
-    whole = (doubt**2).sum(axis=2) + cells.rest + trial.variances.mean(axis=0)
-    return float(((trial.values - mean) ** 2 / whole).mean())
+    variances = (doubt**2).sum(axis=2) + cells.left_out + trial.variances.mean(axis=0)
+    return float(((trial.values - mean) ** 2 / variances).mean())
 
 
 # Validation rows that suffice by themselves; share of cells that an interval should hold.
@@ -328,11 +328,11 @@ class Particles:
 
     def predictions(self, conditions: Whole, targets: Whole, count: int, random: np.random.Generator) -> Array:
         """Draws (count, a) of the cells ``targets``, conditional on the measured values of ``conditions``."""
-        mean, own, roots = self.draw(conditions, count, random)[1].conditional(
+        mean, variances, roots = self.draw(conditions, count, random)[1].conditional(
             self.measured.values, conditions, targets
         )
         common = (roots @ random.standard_normal((count, roots.shape[2], 1)))[:, :, 0]
-        return mean + common + np.sqrt(own) * random.standard_normal(mean.shape)
+        return mean + common + np.sqrt(variances) * random.standard_normal(mean.shape)
 
 
 def by_others(particles: Particles, seed: int) -> Prediction:

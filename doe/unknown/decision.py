@@ -79,16 +79,16 @@ def _likely_shares(values: Array, variances: Array, hits: Hits, seed: int) -> li
     """
     random, count = np.random.default_rng(seed), len(values)
     noise = np.maximum(variances, LEAST_NOISE**2 * (values**2).mean(axis=0) + 1e-300)
-    earlier, whole = _shares(values, noise, np.ones(count, dtype=np.int64), hits, random)
+    earlier, shares = _shares(values, noise, np.ones(count, dtype=np.int64), hits, random)
     # Every resampling begins anew, as the amount of noise is estimated from the same rows.
     resamples = max(RESAMPLES * USUAL_ROWS // max(count, USUAL_ROWS), FEWEST_RESAMPLES)
     drawn = (np.bincount(rows, minlength=count) for rows in random.integers(0, count, (resamples, count)))
     again = [_shares(values, noise, counts, hits, random)[1] for counts in drawn]
     ends = np.quantile(again, [0.5 - 0.5 * LEVEL, 0.5 + 0.5 * LEVEL], axis=0)
-    moved = whole - earlier
+    moved = shares - earlier
     ends += [moved.clip(max=0.0), moved.clip(min=0.0)]
     intervals = []
-    for value, low, high in zip(whole.tolist(), *ends.clip(0.0, 1.0).tolist(), strict=True):
+    for value, low, high in zip(shares.tolist(), *ends.clip(0.0, 1.0).tolist(), strict=True):
         # Resampled rows that all agree show no scatter; Wilson's interval still has one.
         least, most = wilson(value, count)
         intervals.append(Share(value, min(low, least), max(high, most)))
@@ -97,8 +97,8 @@ def _likely_shares(values: Array, variances: Array, hits: Hits, seed: int) -> li
 
 def shrunk(gains: Array, variances: Array) -> Array:
     """Gains (n, m) shrunk towards their mean, so that they scatter as the true ones do."""
-    whole = gains.var(axis=0, ddof=1)
-    signal = np.divide((whole - variances.mean(axis=0)).clip(0.0), whole, out=np.zeros_like(whole), where=whole > 0.0)
+    total = gains.var(axis=0, ddof=1)
+    signal = np.divide((total - variances.mean(axis=0)).clip(0.0), total, out=np.zeros_like(total), where=total > 0.0)
     middle: Array = gains.mean(axis=0)
     return middle + np.sqrt(signal) * (gains - middle)
 
@@ -239,7 +239,7 @@ class _Gain:
         """Covariance (n, n) of the rows."""
         return self.emulator.prior(self.emulator.points, self.emulator.points) + np.diag(self.emulator.noise)
 
-    def of(self, rows: Whole, sharp: bool = False) -> tuple[Array, Array]:
+    def forecast(self, rows: Whole, sharp: bool = False) -> tuple[Array, Array]:
         """Predictions (k,) at the fresh input sets by ``rows`` (r,), and their residuals (r,), each row predicted by the others.
 
         Noise is subtracted from the residuals; where ``sharp``, the emulator's own error too. Hyperparameters stay the same.
@@ -253,19 +253,19 @@ class _Gain:
         follows = float(np.cov(gain, others)[0, 1] / max(others.var(ddof=1), 1e-300))
         slope, middle, mean = min(max(follows, 0.0), 1.0), float(others.mean()), float(gain.mean())
         missed = gain - mean - slope * (others - middle)
-        whole = max(float((missed**2).mean()), 1e-300)
+        variance = max(float((missed**2).mean()), 1e-300)
         # Noise is no part of the true residuals.
         off = float((alone - self.emulator.hyperparameters.nugget if sharp else variances).mean())
-        missed *= np.sqrt(max(whole - off, 0.0) / whole)
+        missed *= np.sqrt(max(variance - off, 0.0) / variance)
         predictions = self.emulator.middle + self.across[:, rows] @ weights
         return mean + slope * (predictions - middle), missed
 
     @property
     def explained(self) -> float:
         """Share of the gain's variance without noise that the inputs predict."""
-        missed = self.of(np.arange(self.emulator.values.size))[1]
-        whole = float(self.emulator.values.var(ddof=1) - self.emulator.variances.mean())
-        return max(1.0 - float((missed**2).mean()) / max(whole, 1e-300), 0.0)
+        missed = self.forecast(np.arange(self.emulator.values.size))[1]
+        variance = float(self.emulator.values.var(ddof=1) - self.emulator.variances.mean())
+        return max(1.0 - float((missed**2).mean()) / max(variance, 1e-300), 0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -360,17 +360,17 @@ def decisive_inputs(
     gains_at, narrow, few = (
         [_Gain(emulator, sets) for emulator in emulators] for sets in (fresh, 0.25 + 0.5 * fresh, fresh[:POINTS])
     )
-    better, halved = (_chances([gain.of(every) for gain in gains_of]) for gains_of in (gains_at, narrow))
+    better, halved = (_chances([gain.forecast(every) for gain in gains_of]) for gains_of in (gains_at, narrow))
     halves = [np.sort(random.permutation(count)[: count // 2]) for _ in range(HALVES)]
     places = list(range(inputs - 1) if knowable is None else knowable)
     sets = fresh[:, [*places, -1]]
-    fewer, whole = _Slices.of(sets[:POINTS], FEWER_BINS), _Slices.of(sets, BINS)
+    fewer, usual = _Slices.of(sets[:POINTS], FEWER_BINS), _Slices.of(sets, BINS)
     by = _Estimates(
-        whole.estimate(better),
+        usual.estimate(better),
         _Slices.of(sets, BINS // 2).estimate(better),
-        whole.estimate(_chances([gain.of(every, sharp=True) for gain in gains_at])),
+        usual.estimate(_chances([gain.forecast(every, sharp=True) for gain in gains_at])),
         fewer.estimate(better[:POINTS]),
-        [fewer.estimate(_chances([gain.of(rows) for gain in few])) for rows in halves],
+        [fewer.estimate(_chances([gain.forecast(rows) for gain in few])) for rows in halves],
         [
             _Slices.of(sets[rows], FEWER_BINS).estimate(better[rows])
             for rows in np.split(np.arange(len(fresh)), AVERAGE_PARTS)
@@ -390,12 +390,12 @@ def decisive_inputs(
 class _Estimates(NamedTuple):
     """Estimates of worths and flips by variants of rows, slices and fresh sets.
 
-    whole, wide, sharp : by all rows; in slices twice as wide; without the emulators' own errors
+    usual, wide, sharp : by all rows; in slices twice as wide; without the emulators' own errors
     fewer, again : by fewer fresh sets; the same by resamplings of the rows
     parts : by parts of the fresh sets
     """
 
-    whole: _Estimate
+    usual: _Estimate
     wide: _Estimate
     sharp: _Estimate
     fewer: _Estimate
@@ -497,22 +497,22 @@ class _Measured:
 
 def _measured(places: Sequence[int], by: _Estimates) -> _Measured:
     """Worths and flips of inputs at ``places`` with all their errors."""
-    whole = by.whole
+    usual = by.usual
     # A flip to the other side does not count.
     again, parts = (
-        [estimate._replace(flips=np.where(estimate.above == whole.above, estimate.flips, np.nan)) for estimate in many]
+        [estimate._replace(flips=np.where(estimate.above == usual.above, estimate.flips, np.nan)) for estimate in many]
         for many in (by.again, by.parts)
     )
 
     def about(name: str) -> _Figures:
-        value, wide, sharp, fewer = (getattr(estimate, name) for estimate in (whole, by.wide, by.sharp, by.fewer))
+        value, wide, sharp, fewer = (getattr(estimate, name) for estimate in (usual, by.wide, by.sharp, by.fewer))
         scatter, averages = (np.array([getattr(estimate, name) for estimate in many]) for many in (again, parts))
         # Slices can only lower a worth.
         blur = value - wide if name == "flips" else (value - wide).clip(0.0)
         biases = np.nan_to_num([blur, sharp - value, fewer - _mean(scatter)])
         return _Figures(value, _about(value, scatter, averages), biases)
 
-    return _Measured(places, about("worths"), about("flips"), whole.above, about("pairs"))
+    return _Measured(places, about("worths"), about("flips"), usual.above, about("pairs"))
 
 
 def _about(values: Array, again: Array, parts: Array) -> Array:

@@ -168,15 +168,15 @@ def effect_shares(quantiles: Array, values: Array) -> Array:
     coded = quantiles - quantiles.mean(axis=0)
     effects = np.linalg.lstsq(coded, values - values.mean(axis=0), rcond=None)[0]
     variances = (effects * coded.std(axis=0)[:, None]) ** 2
-    whole = variances.sum(axis=0)
-    return np.divide(variances, whole, out=np.zeros_like(variances), where=whole > 0.0)
+    total = variances.sum(axis=0)
+    return np.divide(variances, total, out=np.zeros_like(variances), where=total > 0.0)
 
 
 def retained(shares_: Array, always: list[int], most: int) -> list[int]:
     """Sorted places of ``most`` inputs: those ``always``, then those with the largest share (d, m) in any output."""
     ranked = np.argsort(-shares_.max(axis=1), kind="stable").tolist()
-    rest = [place for place in ranked if place not in always]
-    return sorted([*always, *rest[: max(most - len(always), 0)]])
+    candidates = [place for place in ranked if place not in always]
+    return sorted([*always, *candidates[: max(most - len(always), 0)]])
 
 
 def main_effects(quantiles: Array, values: Array) -> Array:
@@ -196,10 +196,10 @@ def strongest(quantiles: Array, values: Array, most: int, always: Sequence[int] 
     After those ``always``, each is the one that explains most of the variance that those before it do not.
     """
     picked, residuals, basis = list[int](), _unit(values), np.ones((len(quantiles), 1)) / np.sqrt(len(quantiles))
-    rest = [place for place in range(quantiles.shape[1]) if place not in always]
+    pool = [place for place in range(quantiles.shape[1]) if place not in always]
     count = min(max(most, len(always)), quantiles.shape[1])
     while len(picked) < count:
-        candidates = list(always[len(picked) : len(picked) + 1]) or rest
+        candidates = list(always[len(picked) : len(picked) + 1]) or pool
         # A column that those before explain has no basis left.
         bases = [_base(quantiles[:, place], basis) for place in candidates]
         gains = [float(((base.T @ residuals) ** 2).sum(axis=0).max()) for base in bases]
@@ -207,7 +207,7 @@ def strongest(quantiles: Array, values: Array, most: int, always: Sequence[int] 
         picked.append(candidates[best])
         basis = np.column_stack([basis, bases[best]])
         residuals = residuals - bases[best] @ (bases[best].T @ residuals)
-        rest = [place for place in rest if place != picked[-1]]
+        pool = [place for place in pool if place != picked[-1]]
     return sorted(picked)
 
 

@@ -64,14 +64,14 @@ class Cells:
     middle: Array
     axes: Array
     emulators: list[Emulator]
-    rest: Array
+    left_out: Array
 
     def mean(self, quantiles: Array) -> Array:
         """Cells (n, c) at quantiles (n, d)."""
         return self.middle + np.column_stack([emulator.mean(quantiles) for emulator in self.emulators]) @ self.axes
 
     def predict(self, quantiles: Array) -> tuple[Array, Array]:
-        """Cells (n, c) and their standard errors by component (n, c, p): their squares and ``rest`` sum to the variance."""
+        """Cells (n, c) and their standard errors by component (n, c, p): their squares and ``left_out`` sum to the variance."""
         mean, sd = (
             np.column_stack(column) for column in zip(*(e.predict(quantiles) for e in self.emulators), strict=True)
         )
@@ -98,13 +98,13 @@ def fit_cells(
     scores = coded @ axes.T
     # Scatter that the components do not contain.
     scatter = (np.eye(unit.size) - axes.T @ axes) ** 2 @ noise.mean(axis=0)
-    rest = ((coded - scores @ axes) ** 2).mean(axis=0) - scatter
+    left_out = ((coded - scores @ axes) ** 2).mean(axis=0) - scatter
     emulators = []
     for place, column in enumerate(scores.T):
         same = before is not None and place < len(before.emulators)
         start = before.emulators[place].hyperparameters if before is not None and same else None
         emulators.append(fit_emulator(quantiles, column, noise @ axes[place] ** 2, trend="quadratic", start=start))
-    return Cells(middle, axes * unit, emulators, rest.clip(0.0) * allowance)
+    return Cells(middle, axes * unit, emulators, left_out.clip(0.0) * allowance)
 
 
 # Scatter of the simulation's error from row to row, as a share of its bias.
@@ -191,19 +191,19 @@ class Joint(NamedTuple):
     """Cells as jointly normal at n input sets: mean (n, c), own variances (n, c), common roots U (n, c, r)."""
 
     mean: Array
-    own: Array
+    variances: Array
     roots: Array
 
     def log_density(self, values: Array, cells: Whole) -> Array:
         """Logarithm (n,) of the density of the ``values`` (c,) at the places ``cells`` (k,), by Woodbury's identity."""
-        own, roots = self.own[:, cells], self.roots[:, cells]
+        variances, roots = self.variances[:, cells], self.roots[:, cells]
         off = values[cells] - self.mean[:, cells]
-        weighed = roots / own[:, :, None]
+        weighed = roots / variances[:, :, None]
         factor = np.linalg.cholesky(np.eye(roots.shape[2]) + np.swapaxes(roots, 1, 2) @ weighed)
         inside = np.linalg.solve(factor, np.einsum("ncr,nc->nr", weighed, off)[:, :, None])[:, :, 0]
-        determinant = np.log(own).sum(axis=1) + 2.0 * np.log(np.diagonal(factor, axis1=1, axis2=2)).sum(axis=1)
+        determinant = np.log(variances).sum(axis=1) + 2.0 * np.log(np.diagonal(factor, axis1=1, axis2=2)).sum(axis=1)
         return -0.5 * (
-            (off**2 / own).sum(axis=1) - (inside**2).sum(axis=1) + determinant + cells.size * np.log(2.0 * np.pi)
+            (off**2 / variances).sum(axis=1) - (inside**2).sum(axis=1) + determinant + cells.size * np.log(2.0 * np.pi)
         )
 
     def latent(self, values: Array, conditions: Whole) -> tuple[Array, Array]:
@@ -211,7 +211,7 @@ class Joint(NamedTuple):
 
         They are conditional on the ``values`` (c,) at the places ``conditions`` (k,). U times them is common to all cells.
         """
-        roots = np.swapaxes(self.roots[:, conditions] / self.own[:, conditions, None], 1, 2)
+        roots = np.swapaxes(self.roots[:, conditions] / self.variances[:, conditions, None], 1, 2)
         information = np.eye(self.roots.shape[2]) + roots @ self.roots[:, conditions]
         inverse = np.linalg.inv(np.linalg.cholesky(information))
         mean = np.swapaxes(inverse, 1, 2) @ (
@@ -226,16 +226,16 @@ class Joint(NamedTuple):
         """
         middle, root = self.latent(values, conditions)
         across = self.roots[:, targets]
-        return self.mean[:, targets] + (across @ middle[:, :, None])[:, :, 0], self.own[:, targets], across @ root
+        return self.mean[:, targets] + (across @ middle[:, :, None])[:, :, 0], self.variances[:, targets], across @ root
 
 
 def joint(cells: Cells, measured: Measured, quantiles: Array, errors: Errors) -> Joint:
     """Measured cells at input sets (n, d) with errors of the simulation (n, m)."""
     mean, doubt = cells.predict(quantiles)
-    own = measured.variances + cells.rest + (BY_ROW * errors.rows[:, measured.output]) ** 2
+    variances = measured.variances + cells.left_out + (BY_ROW * errors.rows[:, measured.output]) ** 2
     level = np.hypot(errors.level, measured.accuracy)[:, measured.output, None]
     biases = level * (measured.output[:, None] == np.arange(measured.scales.size))
-    return Joint(mean, own, np.concatenate([biases, doubt], axis=2))
+    return Joint(mean, variances, np.concatenate([biases, doubt], axis=2))
 
 
 PARTICLES = 4000
@@ -304,11 +304,11 @@ def _weights(logs: Array) -> tuple[Array, float]:
     return weights / weights.sum(), most + float(np.log(weights.mean()))
 
 
-def _step(logs: Array, rest: float) -> float:
-    """Increase of the power, ``rest`` at most, at which the effective share of particles falls to COUNTING."""
-    if effective(rest * logs) >= COUNTING * logs.size:
-        return rest
-    low, high = 0.0, rest
+def _step(logs: Array, step: float) -> float:
+    """Increase of the power, ``step`` at most, at which the effective share of particles falls to COUNTING."""
+    if effective(step * logs) >= COUNTING * logs.size:
+        return step
+    low, high = 0.0, step
     for _ in range(40):
         middle = 0.5 * (low + high)
         low, high = (middle, high) if effective(middle * logs) >= COUNTING * logs.size else (low, middle)
@@ -472,7 +472,7 @@ def unseen_offsets(
     slopes = (means[:inputs] - means[inputs:]).T / (2.0 * STEP)
     scales = measured.scales[None]
     at = joint(cells, measured, quantiles(centre[None]), Errors(scales, scales, np.zeros(scales.shape, bool)))
-    own, roots = at.own[0, learnt], np.hstack([at.roots[0, learnt], slopes])
+    variances, roots = at.variances[0, learnt], np.hstack([at.roots[0, learnt], slopes])
     listed = list[Unseen | None]()
     for place, scale in enumerate(measured.scales):
         offset = (measured.output[learnt] == place).astype(float)
@@ -480,17 +480,17 @@ def unseen_offsets(
             listed.append(None)
             continue
         # The first columns of the roots are the biases of the outputs.
-        variance = 1.0 / float(offset @ _weighed(own, np.delete(roots, place, axis=1), offset))
+        variance = 1.0 / float(offset @ _weighed(variances, np.delete(roots, place, axis=1), offset))
         size = _largest(variance, float(scale), float(measured.wide[place]), float(measured.accuracy[place]))
-        listed.append(Unseen(size, size * (slopes.T @ _weighed(own, roots, offset))))
+        listed.append(Unseen(size, size * (slopes.T @ _weighed(variances, roots, offset))))
     return listed
 
 
-def _weighed(own: Array, roots: Array, vector: Array) -> Array:
+def _weighed(variances: Array, roots: Array, vector: Array) -> Array:
     """The ``vector`` (k,) times the inverse of diag(own) + UU', by Woodbury's identity."""
-    scaled = roots / own[:, None]
+    scaled = roots / variances[:, None]
     inner = np.eye(roots.shape[1]) + roots.T @ scaled
-    weighed: Array = vector / own - scaled @ np.linalg.solve(inner, scaled.T @ vector)
+    weighed: Array = vector / variances - scaled @ np.linalg.solve(inner, scaled.T @ vector)
     return weighed
 
 

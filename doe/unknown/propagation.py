@@ -110,8 +110,8 @@ class Emulated:
     def residuals(self) -> Array:
         """Residuals (n,) of each run predicted by the others, in values of the emulator, shrunk by their share of noise."""
         missed = self.emulator.values - self.emulator.leave_one_out()[0]
-        whole = float((missed**2).mean())
-        return missed * np.sqrt(residual_variance(self.emulator) / whole) if whole > 0.0 else missed
+        total = float((missed**2).mean())
+        return missed * np.sqrt(residual_variance(self.emulator) / total) if total > 0.0 else missed
 
 
 def residual_variance(emulator: Emulator) -> float:
@@ -153,8 +153,8 @@ def emulated(runs: Runs, most: int | None = None, always: Sequence[int] = (), lo
         # The last input does nothing and stays for comparison.
         columns = np.array([*strongest(runs.quantiles[:, :-1], values[:, None], most, always), columns[-1]])
     emulator = fit_emulator(runs.quantiles[:, columns], values, smooth, trend="linear")
-    whole = float(values.var(ddof=1))
-    ceiling = 1.0 - float(smooth.mean()) / whole if whole > 0.0 else 0.0
+    total = float(values.var(ddof=1))
+    ceiling = 1.0 - float(smooth.mean()) / total if total > 0.0 else 0.0
     return Emulated(emulator, columns, logarithmic, float((smooth * unit).mean()), emulator.q2(), ceiling)
 
 
@@ -162,8 +162,8 @@ def variance_by_cause(runs: Runs, fitted: Emulated) -> dict[str, float]:
     """Shares of the variance of single runs by "simulation", "numerical" and "inputs"; 0 of the last where noise exceeds it."""
     inputs = max(float(runs.values.var(ddof=1)) - fitted.noise - runs.numerical, 0.0)
     variances = {"simulation": fitted.noise, "numerical": runs.numerical, "inputs": inputs}
-    whole = sum(variances.values()) or 1.0
-    return {cause: variance / whole for cause, variance in variances.items()}
+    total = sum(variances.values()) or 1.0
+    return {cause: variance / total for cause, variance in variances.items()}
 
 
 @one_thread
@@ -176,12 +176,12 @@ def range_of(fitted: Emulated, fresh: Array, seed: int) -> Range:
 
 def _quantiles(fitted: Emulated, fresh: Array, random: np.random.Generator) -> tuple[Array, Array]:
     """The output at the ends and the middle of its range, and standard errors of these by resampling runs."""
-    rest, others = fitted.residuals, fitted.emulator.leave_one_out()[0]
-    count = len(rest)
-    values = np.sort(fitted.emulator.mean(fresh[:, fitted.columns]) + random.choice(rest, len(fresh)))
+    residuals, others = fitted.residuals, fitted.emulator.leave_one_out()[0]
+    count = len(residuals)
+    values = np.sort(fitted.emulator.mean(fresh[:, fitted.columns]) + random.choice(residuals, len(fresh)))
     emulator = (np.arange(len(values)) + 0.5) / len(values)
-    runs = (others + rest)[:, None] <= values
-    control = np.searchsorted(np.sort(rest), values - others[:, None], side="right") / count
+    runs = (others + residuals)[:, None] <= values
+    control = np.searchsorted(np.sort(residuals), values - others[:, None], side="right") / count
     off = runs - control
     # Between these ends of so few runs are 90 % of further input sets on average (Wilks 1941).
     levels = (np.array(ENDS) * (count + 1) - 0.5) / count
@@ -215,7 +215,7 @@ class Indices(NamedTuple):
 def sobol(fitted: Emulated, inputs: int, seed: int) -> Indices:
     """Sobol' indices of the independent inputs of an emulator, uniform in their quantiles."""
     even: Sample = lambda points, seed: nested(inputs, points, seed)  # noqa: E731
-    ends = _with_intervals(fitted, lambda *of: np.array(_indices(inputs, *of)), even, seed)
+    ends = _with_intervals(fitted, lambda *setting: np.array(_indices(inputs, *setting)), even, seed)
     first, total = ([Share(*map(float, ends[:, kind, column])) for column in range(inputs)] for kind in (0, 1))
     return Indices(first, total)
 
@@ -227,11 +227,11 @@ def shapley(fitted: Emulated, joint: Joint, seed: int) -> list[Share]:
     Their sum is the share of the variance that the emulator explains.
     """
     # Rows of a sample are not evenly spread, so more points are needed.
-    ends = _with_intervals(fitted, lambda *of: _effects(joint, *of), joint.sets, seed, 4 * POINTS)
+    ends = _with_intervals(fitted, lambda *setting: _effects(joint, *setting), joint.sets, seed, 4 * POINTS)
     return [Share(*map(float, column)) for column in ends.T]
 
 
-def explained(fitted: Emulated, values: Array, rest: float) -> float:
+def explained(fitted: Emulated, values: Array, residual: float) -> float:
     """Share of an output's variance over all inputs that the emulator explains.
 
     values : (n,), of the emulator at input sets of their distribution
@@ -239,18 +239,18 @@ def explained(fitted: Emulated, values: Array, rest: float) -> float:
     """
     mean, square = float(values.mean()), float((values**2).mean())
     # Of y = g exp(e) with normal e: E[y | g] = g exp(rest/2), E[y^2] = E[g^2] exp(2 rest).
-    whole = np.exp(rest) * square - mean**2 if fitted.logarithmic else square - mean**2 + rest
-    return (square - mean**2) / whole if whole > 0.0 else 0.0
+    total = np.exp(residual) * square - mean**2 if fitted.logarithmic else square - mean**2 + residual
+    return (square - mean**2) / total if total > 0.0 else 0.0
 
 
 def _with_intervals(fitted: Emulated, measure: Measure, sample: Sample, seed: int, points: int = POINTS) -> Array:
     """Shares (3, ...) of the variance over all inputs, with the ends of their intervals."""
     random, emulator = np.random.default_rng(seed), fitted.emulator
 
-    def shares(function: Function, rest: float, count: int, seed: int) -> Array:
-        return measure(function, count, seed) * explained(fitted, function(sample(count, seed)), rest)
+    def shares(function: Function, residual: float, count: int, seed: int) -> Array:
+        return measure(function, count, seed) * explained(fitted, function(sample(count, seed)), residual)
 
-    whole = shares(fitted.at_columns, residual_variance(emulator), points, seed)
+    usual = shares(fitted.at_columns, residual_variance(emulator), points, seed)
     noise = np.sqrt(emulator.variances + emulator.hyperparameters.nugget)
     like: dict[str, Any] = {"trend": "linear", "start": emulator.hyperparameters}
     misses = []
@@ -263,7 +263,7 @@ def _with_intervals(fitted: Emulated, measure: Measure, sample: Sample, seed: in
         by = POINTS_OF_REFITS, seed + 1 + again
         ours = shares(refit.at_columns, residual_variance(refit.emulator), *by)
         misses.append(ours - shares(simulated, emulator.hyperparameters.nugget, *by))
-    middle = whole - np.mean(misses, axis=0)
+    middle = usual - np.mean(misses, axis=0)
     student = stats.t.ppf(0.5 + 0.5 * SHARE_LEVEL, REFITS - 1)
     half = student * np.std(misses, axis=0, ddof=1) * np.sqrt(1.0 + 1.0 / REFITS)
     return np.stack([middle, middle - half, middle + half]).clip(0.0, 1.0)
@@ -288,9 +288,9 @@ def _effects(joint: Joint, function: Function, points: int, seed: int) -> Array:
     even = nested(2 * count, points, seed)
     sets, fresh = joint.placed(even[:, :count]), even[:, count:]
     values = function(sets)
-    whole = float(values.var())
+    total = float(values.var())
     # Variance explained by no input and by all of them.
-    explained = {bytes(count): 0.0, bytes([1] * count): whole}
+    explained = {bytes(count): 0.0, bytes([1] * count): total}
     effects = np.zeros(count)
     for order in (
         order for _ in range(ORDERS) for drawn in (random.permutation(count),) for order in (drawn, drawn[::-1])
@@ -301,7 +301,7 @@ def _effects(joint: Joint, function: Function, points: int, seed: int) -> Array:
             if (key := subset.tobytes()) not in explained:
                 again = function(joint.redrawn(sets, subset, fresh))
                 # Half of the mean square difference of two sets with these inputs in common is due to the others (Jansen 1999).
-                explained[key] = whole - 0.5 * float(((values - again) ** 2).mean())
+                explained[key] = total - 0.5 * float(((values - again) ** 2).mean())
             effects[place] += explained[key] - before
             before = explained[key]
-    return effects / (2 * ORDERS * whole)
+    return effects / (2 * ORDERS * total)

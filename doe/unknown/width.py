@@ -113,8 +113,8 @@ def width(parts: Sequence[Scores], power: Power | None = None) -> Width:
 def _chances(sorted_sums: Array, sums: Array) -> Array:
     """Probabilities (n, g) of sums (n, g) as small or as large among the sorted ones (s, g), the smaller of both."""
     count, pairs = len(sorted_sums), list(zip(sorted_sums.T, sums.T, strict=True))
-    below = np.column_stack([np.searchsorted(those, own, "right") for those, own in pairs])
-    above = count - np.column_stack([np.searchsorted(those, own) for those, own in pairs])
+    below = np.column_stack([np.searchsorted(listed, draws, "right") for listed, draws in pairs])
+    above = count - np.column_stack([np.searchsorted(listed, draws) for listed, draws in pairs])
     return (1.0 + np.minimum(below, above)) / (count + 1.0)
 
 

@@ -59,9 +59,9 @@ def design_of(study: Study) -> Design:
 
 def realised(study: Study, coded: Array, reach: float) -> Array:
     """Coded points (n, k) with whole numbers rounded."""
-    whole, half = np.array([factor.whole for factor in study.file.factor]), reach * study.step
+    integer, half = np.array([factor.whole for factor in study.file.factor]), reach * study.step
     rounded = _whole(study.actual(coded), study.centre, study.centre - half, study.centre + half)
-    return np.where(whole, study.coded(rounded), coded)
+    return np.where(integer, study.coded(rounded), coded)
 
 
 def _whole(actual: Array, centre: Array, low: Array, high: Array) -> Array:

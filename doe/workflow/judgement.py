@@ -176,9 +176,9 @@ def _flip(best: Decider) -> str:
 def _undecided(robust: Robust, decision: Decision) -> str:
     """The inputs that may be decisive, and how many pairs would decide between them."""
     worths = {decider.key: _points(decider) for decider in decision.inputs}
-    best, *rest = decision.rivals
-    others = "".join(f", {key} by {worths[key]}" for key in rest[: CANDIDATES - 1])
-    more = len(rest) - CANDIDATES + 1
+    best, *rivals = decision.rivals
+    others = "".join(f", {key} by {worths[key]}" for key in rivals[: CANDIDATES - 1])
+    more = len(rivals) - CANDIDATES + 1
     if more > 0:
         others += f", {counted(more, 'other input')} by less"
     many = 2 ** math.ceil(math.log2(decision.needed)) if decision.needed <= MOST_PAIRS else 0

@@ -222,10 +222,10 @@ class SharedTolerance:
         """The widest grade of the parts that fits a width [mm]. Raises MethodError for a size outside the tables."""
         tables = {part.name: list(grade_tolerances(part.nominal).values()) for part in self.parts}
 
-        def whole(place: int) -> float:
+        def width_of(place: int) -> float:
             return sum((*(abs(part.coefficient) * tables[part.name][place] for part in self.parts), *self.taken))
 
-        fitting = [place for place in range(len(GRADES)) if whole(place) <= width * (1.0 + 1e-9)]
+        fitting = [place for place in range(len(GRADES)) if width_of(place) <= width * (1.0 + 1e-9)]
         if not fitting:
             return Grade(FINER, -1, {})
         best = fitting[-1]

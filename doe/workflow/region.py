@@ -102,10 +102,10 @@ class Taken(NamedTuple):
         taken = play.drawn - play.operating
         names = [name for name, change in changes.items() if -change > LEAST_CHANGE * abs(taken)]
         takes = "takes" if len(names) == 1 and names != ["fits"] else "take"
-        rest = f"less than {1e6 * self.floor:.3g} um left would be nearly lost"
-        rest += " and heat itself until it closes" if self.hotter else ""
+        risk = f"less than {1e6 * self.floor:.3g} um left would be nearly lost"
+        risk += " and heat itself until it closes" if self.hotter else ""
         return (
-            f"{' and '.join(names)} {takes} {1e3 * taken:.3f} mm of it, and {rest}" if taken > 0.0 and names else rest
+            f"{' and '.join(names)} {takes} {1e3 * taken:.3f} mm of it, and {risk}" if taken > 0.0 and names else risk
         )
 
 
@@ -305,10 +305,10 @@ def _heat(study: Problem, balance: Balances) -> tuple[dict[str, list[Temperature
     if all(scene.thermal is None for scene in scenes.values()):
         return {}, [], {}
     for kelvins in WIDER_K:
-        rest = [name for name in scenes if name not in heat]
+        cold = [name for name in scenes if name not in heat]
         words = "the middle of the region" + (" with wider clearances" if kelvins else "")
-        found = _balanced(study, balance, _wider(study, scenes, kelvins), rest, words, near)
-        for name in rest:
+        found = _balanced(study, balance, _wider(study, scenes, kelvins), cold, words, near)
+        for name in cold:
             outcome = found.get(name, "its temperatures are undecided")
             if isinstance(outcome, Temperatures):
                 heat[name] = [outcome]
@@ -320,7 +320,7 @@ def _heat(study: Problem, balance: Balances) -> tuple[dict[str, list[Temperature
     raise RunError(
         "; ".join(
             f"the middle of the region has no steady temperatures{f' at {name}' if name else ''}: {causes[name].rstrip('.')}"
-            for name in rest
+            for name in cold
         )
         + "; wider clearances do not change that: give more or cooler oil, or less speed and load"
     )

@@ -239,7 +239,7 @@ def _emulators(
 class _GainEmulators:
     """Emulators of gains over the baseline and of limited responses, at ``sets`` (s, d + 1) of inputs.
 
-    ``rest`` (s, q): a residual of a run for each set, which is added to the gains. ``box``: ends (k,) of the region.
+    ``offset`` (s, q): a residual of a run for each set, which is added to the gains. ``box``: ends (k,) of the region.
     """
 
     gain: Sequence[Emulated]
@@ -247,7 +247,7 @@ class _GainEmulators:
     study_goals: Goals
     box: tuple[Array, Array]
     sets: Array
-    rest: Array
+    offset: Array
 
     @property
     def goals(self) -> Goals:
@@ -261,7 +261,7 @@ class _GainEmulators:
 
     def gains(self, points: Array) -> Array:
         """Relative gains (n, s, q) at points (n, k)."""
-        return self._outputs(self.gain, points) + self.rest
+        return self._outputs(self.gain, points) + self.offset
 
     def objectives(self, points: Array, share: float | None) -> Array:
         """Mean or quantile of the gains at points (n, k), then of each limited response, that towards its limit."""

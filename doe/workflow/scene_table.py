@@ -145,9 +145,9 @@ def _keys(sheet: InputTable, overrides: Sequence[str]) -> dict[str, str]:
 
 def _unknown(name: str) -> str:
     """The fault of a column that is no key, with the nearest one."""
-    own = (NAME, SCENE, DESIGNATION, *SHORT)
-    known = dict([*((key.rpartition(".")[2], key) for key in reversed(dotted_keys())), *zip(own, own, strict=True)])
-    near = difflib.get_close_matches(name[:LONGEST_NAME], known, n=len(own))
+    fields = (NAME, SCENE, DESIGNATION, *SHORT)
+    known = {key.rpartition(".")[2]: key for key in reversed(dotted_keys())} | dict(zip(fields, fields, strict=True))
+    near = difflib.get_close_matches(name[:LONGEST_NAME], known, n=len(fields))
     # Of keys that are equally near, such as those of both rings, the first one.
     best = max(reversed(known), key=lambda key: difflib.SequenceMatcher(None, key, name[:LONGEST_NAME]).ratio())
     fix = f"did you mean {known[best]}?" if near else "rename or remove it"
@@ -170,11 +170,11 @@ def _rows(sheet: InputTable, keys: Mapping[str, str]) -> Iterator[SceneRow]:
         faults[key] = iter(sentences)
     for row in range(len(sheet.rows)):
         texts = {name: column.texts[row] for name, column in columns.items()}
-        own = {key: column[row] for key, column in values.items() if column[row] != ""}
-        bad = [next(faults[key]) for key, value in own.items() if value is None]
+        stated = {key: column[row] for key, column in values.items() if column[row] != ""}
+        bad = [next(faults[key]) for key, value in stated.items() if value is None]
         name, designation = texts.get(NAME) or str(row + 1), texts.get(DESIGNATION, "")
         file = sheet.path.parent / texts[SCENE] if texts.get(SCENE) else None
-        yield SceneRow(row + 1, name, file, designation, own, bad)
+        yield SceneRow(row + 1, name, file, designation, stated, bad)
 
 
 # Rows whose results are in memory at a time.
@@ -189,7 +189,7 @@ class RowFigures:
     names: tuple[str, ...]
     numbers: Array
 
-    def of(self, kind: int) -> dict[str, float | None]:
+    def numbers_of(self, kind: int) -> dict[str, float | None]:
         """Numbers of a kind by name of the figure."""
         return dict(zip(self.names, map(finite, self.numbers[kind].tolist()), strict=True))
 
@@ -237,7 +237,7 @@ class RowRun:
         record: dict[str, Any] = {"row": self.row.number, "name": self.row.name, "status": self.status}
         record |= {"keys": dict(self.row.values)}
         if self.figures is not None:
-            values, statistical, numerical = (self.figures.of(kind) for kind in range(3))
+            values, statistical, numerical = (self.figures.numbers_of(kind) for kind in range(3))
             record["figures"] = {
                 name: {"value": value, "statistical_error": statistical[name], "numerical_error": numerical[name]}
                 for name, value in values.items()

@@ -108,34 +108,34 @@ def row(name: str, truth: SimulationResult, results: list[SimulationResult]) -> 
 
     def share(errors: list[float]) -> float:
         pairs = zip(figures, errors, strict=True)
-        return sum(abs(one.value - exact.value) <= math.hypot(error, doubt) for one, error in pairs) / count
+        return sum(abs(figure.value - exact.value) <= math.hypot(error, doubt) for figure, error in pairs) / count
 
     return Row(
         figure=name,
         truth=exact.value,
         truth_error=doubt,
-        covered=share([one.error or 0.0 for one in figures]),
-        statistical_alone=share([one.statistical_error or 0.0 for one in figures]),
-        half_width=sum(one.error or 0.0 for one in figures) / count / size,
-        offset=sum(one.value - exact.value for one in figures) / count / size,
+        covered=share([figure.error or 0.0 for figure in figures]),
+        statistical_alone=share([figure.statistical_error or 0.0 for figure in figures]),
+        half_width=sum(figure.error or 0.0 for figure in figures) / count / size,
+        offset=sum(figure.value - exact.value for figure in figures) / count / size,
     )
 
 
 def pooled(rows: list[Row]) -> float:
     """Share over all figures; those that agree by definition (slip and speed; contact and impact of a dry pocket) count once."""
     same = {"cage_slip"}
-    truth = {one.figure: one.truth for one in rows}
+    truth = {row.figure: row.truth for row in rows}
     if truth["impact_contact_force_N"] == truth["impact_force_N"]:
         same.add("impact_contact_force_N")
-    own = [one for one in rows if one.figure not in same]
-    return sum(one.covered for one in own) / len(own)
+    distinct = [row for row in rows if row.figure not in same]
+    return sum(row.covered for row in distinct) / len(distinct)
 
 
 def conclusion(rows: list[Row], repeats: int) -> str:
     """Whether the intervals cover the truth as often as they claim."""
     low, high = POOLED
     share, scatter = pooled(rows), NORMAL * math.sqrt(0.95 * 0.05 / repeats)
-    narrow = [f"{one.figure} {one.covered:.2f}" for one in rows if one.covered < LOWEST]
+    narrow = [f"{row.figure} {row.covered:.2f}" for row in rows if row.covered < LOWEST]
     over_all = f"Pooled over the results {share:.3f} ({with_error(0.95, scatter)} for a sound interval of one result)"
     if narrow:
         return f"{over_all}; too narrow (below {LOWEST:.2f}): {', '.join(narrow)}."

@@ -118,9 +118,9 @@ class FixedStepRun(Run):
         if duration <= 0.0:
             return
         steps = steps_of(duration, self.step)
-        rest = (carry.y, duration / steps, steps, carry.scratch, self.tally)
+        task = (carry.y, duration / steps, steps, carry.scratch, self.tally)
         steps_made = (
-            velocity_verlet(self.bearing, self.pairs, *rest) if self.verlet else runge_kutta_4(self.bearing, *rest)
+            velocity_verlet(self.bearing, self.pairs, *task) if self.verlet else runge_kutta_4(self.bearing, *task)
         )
         carry.clock[NOW] += duration * steps_made / steps
         carry.counts[ACCEPTED] += steps_made
@@ -382,7 +382,7 @@ def study(
     compile_s = compiling(stretches[0], methods)
     counted = Progress(progress, STARTS + sum(len(method.settings) for method in methods))
     references = reference(stretches, counted.step)
-    attempts = [one for method in methods for one in counted.over(attempts_of(method, stretches, references))]
+    attempts = [attempt for method in methods for attempt in counted.over(attempts_of(method, stretches, references))]
     ratios = speedups(attempts, references.floor(turns))
     sentences = conclusion(attempts, ratios, references.floor(turns), turns)
     written = records(attempts)

@@ -113,7 +113,7 @@ def undecided(hidden: Iterable[Difference], scene: Scene, margin: float = MARGIN
 STEPS = 0.2
 TOLERANCES = (1e-1, 5e-2, 2e-2, 1e-2, 5e-3, 1e-3, 1e-4)
 OUTPUTS: dict[str, Callable[[Replicate], float]] = {
-    figure.key: figure.statistic.of for figure in FIGURES if figure.judged == "target" and figure.statistic
+    figure.key: figure.statistic.value for figure in FIGURES if figure.judged == "target" and figure.statistic
 }
 # A gap of the power balance, or an error of a load, below this does not matter; neither of them scatters.
 NEGLIGIBLE = 0.005
@@ -216,9 +216,9 @@ def conclusion(rows: Sequence[Row], scene: Scene, margin: float = MARGIN) -> str
     reference = rows[-1]
     closing = [row for row in rows[:-1] if row.power_gap <= NEGLIGIBLE]
     best, hidden = first_within(closing, lambda row: f"rtol {row.rtol:g}", margin)
-    rest = undecided(hidden, scene, margin) if hidden else ""
+    doubt = undecided(hidden, scene, margin) if hidden else ""
     if best is None:
-        return rest or (
+        return doubt or (
             f"no tolerance looser than the reference, rtol {reference.rtol:g}, has biases of at most {percent(margin)} and a "
             f"power balance that closes within {percent(NEGLIGIBLE)}"
         )
@@ -227,7 +227,7 @@ def conclusion(rows: Sequence[Row], scene: Scene, margin: float = MARGIN) -> str
         f"errors at most {percent(best.known_to)}) and whose power balance closes within {percent(NEGLIGIBLE)}: "
         f"{best.turn_ms:.2f} ms a shaft turn. The scene has {scene.numerics.rtol:g}."
     )
-    return f"{sentence} Looser ones are {rest}." if hidden else sentence
+    return f"{sentence} Looser ones are {doubt}." if hidden else sentence
 
 
 def bias_of(runs: Sequence[Replicate], reference: Sequence[Replicate]) -> Bias:

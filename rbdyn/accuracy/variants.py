@@ -64,10 +64,10 @@ def option_costs(
         times: tuple[list[float], list[float]] = ([], [])
         gap = 0.0
         for replicate in range(REPEATS):
-            for which, (one, parameters) in enumerate(((option, bearing), (plain, plain_bearing))):
-                run = run_replicate(one, parameters, replicate, one.numerics.rtol, Stop())
-                times[which].append(run.cpu_s / run.derivatives * 1e9)
-                gap = run.power_gap if which == 0 else gap
+            for case, (run_scene, parameters) in enumerate(((option, bearing), (plain, plain_bearing))):
+                run = run_replicate(run_scene, parameters, replicate, run_scene.numerics.rtol, Stop())
+                times[case].append(run.cpu_s / run.derivatives * 1e9)
+                gap = run.power_gap if case == 0 else gap
         with_ns, without_ns = (float(np.median(series)) for series in times)
         rows.append(OptionCost(name, with_ns, without_ns, with_ns - without_ns, gap, compile_s))
     return rows
@@ -176,9 +176,9 @@ def ending(scene: Scene, case: str, assignments: Sequence[str]) -> Ending:
     turns = varied.numerics.turns + varied.numerics.warm_up_turns
     figures = {
         "power_gap": run.power_gap,
-        "impact_force_N": IMPACT_FORCE.of(run),
-        "whirl_deviation_ratio": WHIRL_DEVIATION_RATIO.of(run),
-        "power_loss_W": POWER_LOSS.of(run),
+        "impact_force_N": IMPACT_FORCE.value(run),
+        "whirl_deviation_ratio": WHIRL_DEVIATION_RATIO.value(run),
+        "power_loss_W": POWER_LOSS.value(run),
     }
     status, reason = _judge(figures, rtol, tightened)
     return Ending(

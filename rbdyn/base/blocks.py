@@ -345,12 +345,12 @@ class Sheet(Generic[R]):
 
     def _values(self) -> list[tuple[str, Place[R]]]:
         """Key and place of every value in a file; an error whose key has no column of its own follows its value."""
-        own = {column.key for column in self.columns}
+        keys = {column.key for column in self.columns}
         values = list[tuple[str, Place[R]]]()
         for column in self.columns:
             if column.files and column.key:
                 values.append((column.key, column.key if column.at is None else column.at))
-                if isinstance(column.error, str) and column.error not in own:
+                if isinstance(column.error, str) and column.error not in keys:
                     values.append((column.error, column.error))
         return values
 

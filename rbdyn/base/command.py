@@ -186,18 +186,18 @@ def result_command(
 
     def made(run: Callable[..., Delivery]) -> Callable[..., None]:
         def command(
-            out: Path | None, force: bool, as_json: bool, quiet: bool, verbose: bool = False, **own: Any
+            out: Path | None, force: bool, as_json: bool, quiet: bool, verbose: bool = False, **options: Any
         ) -> None:
             with guarded(as_json), output_folder(out, title, files, keeps, force) as folder:
                 console = Console(folder, as_json, quiet)
                 notice(quiet)
-                delivery = run(console, **own)
+                delivery = run(console, **options)
                 console.deliver(delivery, Detail.of(quiet, verbose))
             if delivery.failed:
                 raise typer.Exit(FAILED)
 
-        _, *own = signature(run).parameters.values()
-        return as_command(command, run.__name__, run.__doc__, [*own, *map(option_of, more, more.values())])
+        _, *options = signature(run).parameters.values()
+        return as_command(command, run.__name__, run.__doc__, [*options, *map(option_of, more, more.values())])
 
     return made
 
@@ -379,7 +379,7 @@ def _has_values(line: str, values: Mapping[str, Any]) -> bool:
     """Whether every name in the line has a value; a part of what is None has none."""
     names = (name.split(".") for _, name, _, _ in string.Formatter().parse(line) if name)
     return all(
-        reduce(lambda whole, part: getattr(whole, part, None), parts, values[name]) is not None
+        reduce(lambda table, part: getattr(table, part, None), parts, values[name]) is not None
         for name, *parts in names
     )
 

@@ -41,7 +41,7 @@ def compiled_digest() -> str:
 
 def code_behind(roots: Sequence[str], texts: Mapping[Path, str] = MappingProxyType({})) -> dict[str, str]:
     """Modules of these packages that the roots need, each with the text that runs. ``texts``: files read before."""
-    own = {"rbdyn", *(root.partition(".")[0] for root in roots)}
+    packages = {"rbdyn", *(root.partition(".")[0] for root in roots)}
     code: dict[str, str] = {}
     waiting, visited = list(roots), set[str]()
     while waiting:
@@ -54,7 +54,7 @@ def code_behind(roots: Sequence[str], texts: Mapping[Path, str] = MappingProxyTy
             continue
         code[module] = what_runs(texts[path] if path in texts else path.read_text(encoding="utf-8"))
         for package, names in _IMPORT.findall(code[module]):
-            if package.partition(".")[0] in own:
+            if package.partition(".")[0] in packages:
                 waiting += [package, *(f"{package}.{name}" for name in re.findall(r"\w+", names))]
     return code
 

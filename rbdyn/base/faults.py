@@ -329,12 +329,12 @@ def validated(model: type[Model], data: Mapping[str, Any], source: str) -> Model
     try:
         model.model_validate(_without(data, bad))
     except ValidationError as error:
-        rest = [fault for fault in error.errors(include_url=False) if fault["type"] == "value_error"]
+        contradictions = [fault for fault in error.errors(include_url=False) if fault["type"] == "value_error"]
         names = {str(place[-1]) for fault in errors[:MOST_FAULTS] if (place := _place(fault, data))}
         # A bad key was not left out, even if it is missing now.
         faults += [
             fault
-            for fault in _sentences(model, rest, data, source)[:MOST_FAULTS]
+            for fault in _sentences(model, contradictions, data, source)[:MOST_FAULTS]
             if not any(_states_absence(fault, name) for name in names)
         ]
     raise InputError(dict.fromkeys(faults))
@@ -351,11 +351,11 @@ KINDS = {
 
 def _other_kind(model: type[BaseModel], data: Any, source: str) -> list[str]:
     """The fault of a file of another kind, each key of which would be a fault of its own."""
-    own, other = (next((key for key in KINDS if key in keys), None) for keys in (model.model_fields, data))
-    if own is None or other is None or own in data:
+    expected, found = (next((key for key in KINDS if key in keys), None) for keys in (model.model_fields, data))
+    if expected is None or found is None or expected in data:
         return []
-    kind, readers = KINDS[other]
-    return [f"{source}: this is a {kind}, not a {KINDS[own][0]}; give it to {readers}"]
+    kind, readers = KINDS[found]
+    return [f"{source}: this is a {kind}, not a {KINDS[expected][0]}; give it to {readers}"]
 
 
 def _states_absence(fault: str, name: str) -> bool:
@@ -418,8 +418,8 @@ class Claims:
 
     def reason_for(self, path: tuple[str, ...]) -> str | None:
         """Reason of the claim on a key, a table around it or a key within it; None without a claim."""
-        whole = (self._reasons[path[:end]] for end in range(1, len(path) + 1) if path[:end] in self._reasons)
-        return next(whole, self._within.get(path))
+        reasons = (self._reasons[path[:end]] for end in range(1, len(path) + 1) if path[:end] in self._reasons)
+        return next(reasons, self._within.get(path))
 
 
 def assignment_faults(name: str, assignments: Sequence[str], claims: Mapping[tuple[str, ...], str]) -> list[str]:

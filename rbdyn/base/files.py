@@ -156,8 +156,8 @@ def sign(record: dict[str, Any]) -> None:
 
 def intact(record: dict[str, Any]) -> bool:
     """Whether a record from JSON is unchanged since ``sign``."""
-    rest = {key: value for key, value in record.items() if key != "sha256"}
-    return record.get("sha256") == digest_of(json.dumps(rest))
+    content = {key: value for key, value in record.items() if key != "sha256"}
+    return record.get("sha256") == digest_of(json.dumps(content))
 
 
 def digest_of_file(path: Path) -> str:

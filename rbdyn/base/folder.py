@@ -63,11 +63,11 @@ class OutputFolder:
         path = self.path
         if path is None:
             return
-        own = self._owner(path, source)
+        owner = self._owner(path, source)
         for other in others:
             record_read(other)
         try:
-            self._check(path, own)
+            self._check(path, owner)
             self._new = not path.exists()
             path.mkdir(parents=True, exist_ok=True)
             if seize_lock(path, alone=True) is None:
@@ -75,10 +75,10 @@ class OutputFolder:
                     [f"--out {path}: {self._holder(path)} works in it; wait until it has ended, or name another folder"]
                 )
             self._locked = True
-            earlier = self._check(path, own)
+            earlier = self._check(path, owner)
             shutil.rmtree(path / PARTIAL, ignore_errors=True)
             made = _resolved(path, _lists(earlier)) | dict.fromkeys(self._keeps)
-            self._mark = {**own, "process": f"process {os.getpid()} on {socket.gethostname()}", "files": made}
+            self._mark = {**owner, "process": f"process {os.getpid()} on {socket.gethostname()}", "files": made}
             write_json(path / MARK, self._mark)
         except (OSError, sqlite3.Error) as error:
             reason = getattr(error, "strerror", None) or error
@@ -137,7 +137,7 @@ class OutputFolder:
             return str(read_json(path / MARK)["process"])
         return "another process"
 
-    def _check(self, path: Path, own: dict[str, str]) -> dict[str, Any]:
+    def _check(self, path: Path, owner: dict[str, str]) -> dict[str, Any]:
         """The note of the command that wrote here before; empty without one. Raises InputError."""
         try:
             entries = {entry.name: entry for entry in os.scandir(path)}
@@ -152,7 +152,7 @@ class OutputFolder:
                 raise InputError(
                     [f"--out {path}: its {MARK} cannot be read; name another folder, remove this one or add --force"]
                 ) from None
-        if earlier and entries.keys() - OWN and not self._force and not _same_owner(own, earlier):
+        if earlier and entries.keys() - OWN and not self._force and not _same_owner(owner, earlier):
             source = os.path.normpath(path / earlier["file"]) if earlier["file"] else "another input"
             raise InputError(
                 [
@@ -242,10 +242,10 @@ def _checked(mark: Any, entry: os.DirEntry[str]) -> dict[str, Any]:
     return dict(mark)
 
 
-def _same_owner(own: dict[str, str], other: dict[str, Any]) -> bool:
+def _same_owner(owner: dict[str, str], other: dict[str, Any]) -> bool:
     """Whether two notes are of one command on one file: the same place or the same content."""
-    same_place = own["file"] != "" and own["file"] == other["file"]
-    return own["command"] == other["command"] and (same_place or own["sha256"] == other["sha256"])
+    same_place = owner["file"] != "" and owner["file"] == other["file"]
+    return owner["command"] == other["command"] and (same_place or owner["sha256"] == other["sha256"])
 
 
 def _is_read(entry: os.DirEntry[str]) -> bool:

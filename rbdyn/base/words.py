@@ -169,12 +169,12 @@ class Brief:
 
     def __repr__(self) -> str:
         remark, figures = self.brief()
-        texts = [f"{one.words} {with_error(one.value, one.error)} {one.unit}".rstrip() for one in figures[:4]]
+        texts = [f"{words} {with_error(value, error)} {unit}".rstrip() for words, value, error, unit in figures[:4]]
         return f"<{type(self).__name__}: {', '.join([*texts, remark])}>"
 
     def _repr_html_(self) -> str:
         remark, figures = self.brief()
-        rows = [(one.words, with_error(one.value, one.error), one.unit) for one in figures]
+        rows = [(words, with_error(value, error), unit) for words, value, error, unit in figures]
         return html_table(f"{type(self).__name__}: {remark}", ("figure", "value ± 95 %", "unit"), rows)
 
 

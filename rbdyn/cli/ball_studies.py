@@ -327,8 +327,8 @@ def equilibrium_blocks(result: BallResult) -> list[Block]:
         sentences.append(_runout(result.runout))
     from rbdyn.compiled.kernel import compiler_notes
 
-    whole = Heading("whole bearing" if sentences and any(titles.values()) else "")
-    answer = [*rows, whole, *map(Paragraph, sentences), *_start_blocks(result), *tables]
+    heading = Heading("whole bearing" if sentences and any(titles.values()) else "")
+    answer = [*rows, heading, *map(Paragraph, sentences), *_start_blocks(result), *tables]
     return with_notes((*(result.notes or ()), *compiler_notes()), answer)
 
 

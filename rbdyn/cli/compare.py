@@ -64,7 +64,7 @@ def _identity(found: "Comparison", files: Sequence[Path]) -> Identity:
     a, b = (identity_of("rbdyn compare", side.scene, files) for side in (found.a, found.b))
     pairs = {name: (getattr(a, name), getattr(b, name)) for name in ("bearing", "drawing", "point")}
     words: dict[str, Any] = {
-        name: one if one == other else f"{one} against {other}" for name, (one, other) in pairs.items()
+        name: ours if ours == theirs else f"{ours} against {theirs}" for name, (ours, theirs) in pairs.items()
     }
     return replace(a, **words)
 
@@ -94,9 +94,9 @@ def statement(found: "Comparison") -> str:
     """The significant changes from A to B in words, then the other figures."""
     if not _in_common(found):
         return "No results can be compared."
-    if all(one.verdict == "equal" for one in found.figures.values()):
+    if all(figure.verdict == "equal" for figure in found.figures.values()):
         return f"No {'' if found.inputs else 'input and no '}figure differs."
-    scatter = sum(bool(one.error_together) for one in found.figures.values())
+    scatter = sum(bool(figure.error_together) for figure in found.figures.values())
     together = f" (intervals of 95 % that hold for all {scatter} together)" if scatter > 1 else ""
     exact = "" if scatter else " (an equilibrium has no scatter, so every difference counts)"
     groups = {verdict: _named(found.figures, verdict) for verdict in ORDER}
@@ -105,29 +105,29 @@ def statement(found: "Comparison") -> str:
 
 
 def _in_common(found: "Comparison") -> bool:
-    return any(one.difference is not None for one in found.figures.values())
+    return any(figure.difference is not None for figure in found.figures.values())
 
 
 def _named(figures: Mapping[str, "Difference"], verdict: str) -> str:
     """Figures with this verdict, of significant ones also the change."""
     names = [
-        f"{quantity(name)[0]} {change(name, one)}" if verdict == "significant" else quantity(name)[0]
-        for name, one in figures.items()
-        if one.verdict == verdict
+        f"{quantity(name)[0]} {change(name, figure)}" if verdict == "significant" else quantity(name)[0]
+        for name, figure in figures.items()
+        if figure.verdict == verdict
     ]
     more = [f"{len(names) - MOST_NAMED} more"] if len(names) > MOST_NAMED else []
     return ", ".join([*names[:MOST_NAMED], *more])
 
 
-def change(name: str, one: "Difference") -> str:
+def change(name: str, figure: "Difference") -> str:
     """'3.30 ± 0.62 % less', of B against A; in the figure's own unit where a percentage says nothing."""
     unit = quantity(name)[1]
-    if one.difference is None:
-        return one.verdict
-    if unit in ABSOLUTE or one.percent is None:
-        return improvement(-one.difference, one.error_together, "min", unit)
-    scale = one.percent / one.difference if one.difference else 0.0
-    return improvement(-one.percent, None if one.error_together is None else scale * one.error_together, "min")
+    if figure.difference is None:
+        return figure.verdict
+    if unit in ABSOLUTE or figure.percent is None:
+        return improvement(-figure.difference, figure.error_together, "min", unit)
+    scale = figure.percent / figure.difference if figure.difference else 0.0
+    return improvement(-figure.percent, None if figure.error_together is None else scale * figure.error_together, "min")
 
 
 def _input_table(inputs: Sequence["Input"]) -> Table:
@@ -145,7 +145,7 @@ def _figure_table(caption: str, figures: Mapping[str, "Difference"], detail: Det
     """The figures that are not zero in both."""
     from rbdyn.comparison import difference_sheet
 
-    listed = {name: one for name, one in figures.items() if one.a or one.b}
+    listed = {name: figure for name, figure in figures.items() if figure.a or figure.b}
     return replace(difference_sheet(listed).block, caption=caption, detail=detail)
 
 

@@ -210,11 +210,11 @@ def blocks(record: dict[str, Any]) -> list[Block]:
 def _figures(record: dict[str, Any]) -> list[tuple[str, str]]:
     quantiles, away = record["whirl_ratio_quantiles"], record["eccentricity_um"]
     stiff = record["pocket_bar_stiffness_N_m"]
-    of = "" if away["guide_clearance"] is None else f" of {away['guide_clearance']:.4g}"
+    clearance = "" if away["guide_clearance"] is None else f" of {away['guide_clearance']:.4g}"
     rows = [
         ("whirl speed over cage speed, mean", f"{record['whirl_ratio']:.4g}"),
         ("  median, and 5 % to 95 %", f"{quantiles['50%']:.3g}, {quantiles['5%']:.3g} to {quantiles['95%']:.3g}"),
-        ("eccentricity of the cage [µm]", f"{with_error(away['mean'], away['standard_deviation'])}{of}"),
+        ("eccentricity of the cage [µm]", f"{with_error(away['mean'], away['standard_deviation'])}{clearance}"),
         ("stiffness of the cage's bars [N/m]", stiff if isinstance(stiff, str) else f"{stiff:.3g}"),
     ]
     for name, hit in record["largest"].items():

@@ -290,9 +290,9 @@ def _start_sentence(start: StartResult) -> str:
 
 def _clearances(result: SimulationResult) -> list[Block]:
     """Each clearance from the drawing to operation, in a line; without a mounting only in a report."""
-    whole = result.clearance_um
+    changes = result.clearance_um
     # The radial one has its own parts.
-    plays = {clearance.words: whole.get(clearance.name) for clearance in REPORTED} | {REPORTED[0].words: whole}
+    plays = {clearance.words: changes.get(clearance.name) for clearance in REPORTED} | {REPORTED[0].words: changes}
     sentences = []
     for name, play in plays.items():
         parts = [
@@ -365,14 +365,14 @@ def _losses(result: SimulationResult) -> list[Block]:
     parts = result.part_figures or {}
     errors = {power.source[0]: parts[power.key].stated_error for power in of_kind("power") if power.key in parts}
     terms = sorted(((power, term) for term, power in result.power_terms_W.items() if power), reverse=True)
-    whole = sum(power for power, _ in terms) or 1.0
+    total = sum(power for power, _ in terms) or 1.0
     losses = [
-        (term.replace("_", " "), with_error(power, errors.get(term)), f"{100.0 * power / whole:.2g} %")
+        (term.replace("_", " "), with_error(power, errors.get(term)), f"{100.0 * power / total:.2g} %")
         for power, term in terms
     ]
     losses.append(("all", with_error(result.power_loss_W.value, result.power_loss_W.stated_error), "100 %"))
     losses += [
-        (f"rolling resistance, {race} raceway alone", shown(power, 3), f"{100.0 * power / whole:.2g} %")
+        (f"rolling resistance, {race} raceway alone", shown(power, 3), f"{100.0 * power / total:.2g} %")
         for race, power in result.rolling_resistance_W.items()
     ]
     gap = result.power_balance["relative_gap"] * result.power_loss_W.value

@@ -130,8 +130,8 @@ def _reduced(x):
     """Rest r of x after whole halvings of e^x, |r| < 0.35, and the power of two that they make."""
     x = -700.0 if x < -700.0 else x
     shifted = fma(x, LOG2_E, ROUND)
-    whole = shifted - ROUND
-    r = fma(-whole, LN2_LOW, fma(-whole, LN2_HIGH, x))
+    nearest = shifted - ROUND
+    r = fma(-nearest, LN2_LOW, fma(-nearest, LN2_HIGH, x))
     return r, _from_bits((_bits(shifted) + BIAS) << 52)
 
 
@@ -177,8 +177,8 @@ def _(x):
     half_square = 0.5 * f * f
     series = s * (half_square + fma(z, odd, even))
     # x - x is zero, or NaN where x is: the bits alone would hide it.
-    rest = half_square - fma(power, LN2_LOW, series)
-    return fma(power, LN2_HIGH, f - rest) + (x - x)
+    low = half_square - fma(power, LN2_LOW, series)
+    return fma(power, LN2_HIGH, f - low) + (x - x)
 
 
 def rough_power(x: float, exponent: float) -> float:
@@ -255,8 +255,8 @@ def fast_cos_sin(x: float) -> tuple[float, float]:
 def _(x):
     # Quarter turns are taken off in three parts; their last two bits choose function and sign.
     shifted = fma(x, TWO_OVER_PI, ROUND)
-    whole = shifted - ROUND
-    r = fma(-whole, PIO2_3, fma(-whole, PIO2_2, fma(-whole, PIO2_1, x)))
+    nearest = shifted - ROUND
+    r = fma(-nearest, PIO2_3, fma(-nearest, PIO2_2, fma(-nearest, PIO2_1, x)))
     z = r * r
     # Minimax coefficients of fdlibm for |r| < pi/4.
     high = fma(z, fma(z, 1.58969099521155010221e-10, -2.50507602534068634195e-08), 2.75573137070700676789e-06)

@@ -182,62 +182,62 @@ def law(declaration: Callable[..., Any]) -> Any:
     return choice
 
 
-def _leaves(of: Any) -> list[types.Type]:
-    if isinstance(of, types.NamedTuple | types.NamedUniTuple):
-        return [leaf for field in of.types for leaf in _leaves(field)]
-    return [of]
+def _leaves(form: Any) -> list[types.Type]:
+    if isinstance(form, types.NamedTuple | types.NamedUniTuple):
+        return [leaf for field in form.types for leaf in _leaves(field)]
+    return [form]
 
 
-def alike(one: Any, other: Any) -> bool:
+def alike(left: Any, right: Any) -> bool:
     """Whether two sets of parameters have one type and numbers only; decided at compile time."""
-    if isinstance(one, tuple) and type(one) is type(other):
-        return all(alike(x, y) for x, y in zip(one, other, strict=True))
-    return isinstance(one, float | int) and isinstance(other, float | int)
+    if isinstance(left, tuple) and type(left) is type(right):
+        return all(alike(x, y) for x, y in zip(left, right, strict=True))
+    return isinstance(left, float | int) and isinstance(right, float | int)
 
 
 @numba.extending.overload(alike, jit_options=INLINED)  # type: ignore[arg-type]
-def _alike(one, other):
-    answer = _mixable(one, other)
+def _alike(left, right):
+    answer = _mixable(left, right)
 
-    def body(one, other):
+    def body(left, right):
         return answer
 
     return body
 
 
-def either(first: bool, one: Any, other: Any) -> Any:
-    """``one`` or ``other``, number by number, so that neighbouring lanes may choose differently without a branch.
+def either(first: bool, left: Any, right: Any) -> Any:
+    """``left`` or ``right``, number by number, so that neighbouring lanes may choose differently without a branch.
 
-    Sets that are not ``alike`` cannot be mixed and always give ``other``.
+    Sets that are not ``alike`` cannot be mixed and always give ``right``.
     """
-    return one if first and alike(one, other) else other
+    return left if first and alike(left, right) else right
 
 
 @numba.extending.overload(either, jit_options=INLINED)  # type: ignore[arg-type]
-def _either(first, one, other):
-    if not _mixable(one, other):
+def _either(first, left, right):
+    if not _mixable(left, right):
 
-        def body(first, one, other):
-            return other
-
-        return body
-    return _choice(one)
-
-
-def _mixable(one: Any, other: Any) -> bool:
-    return one == other and all(isinstance(leaf, types.Number) for leaf in _leaves(one))
-
-
-def _choice(of: Any) -> Callable[..., Any]:
-    if isinstance(of, types.Number):
-
-        def body(first, one, other):
-            return one if first else other
+        def body(first, left, right):
+            return right
 
         return body
-    fields = "".join(f"either(first, one.{name}, other.{name})," for name in of.fields)
-    names: dict[str, Any] = {"either": either, "record": of.instance_class, "__name__": __name__}
-    exec(f"def body(first, one, other): return record({fields})", names)
+    return _choice(left)
+
+
+def _mixable(left: Any, right: Any) -> bool:
+    return left == right and all(isinstance(leaf, types.Number) for leaf in _leaves(left))
+
+
+def _choice(form: Any) -> Callable[..., Any]:
+    if isinstance(form, types.Number):
+
+        def body(first, left, right):
+            return left if first else right
+
+        return body
+    fields = "".join(f"either(first, left.{name}, right.{name})," for name in form.fields)
+    names: dict[str, Any] = {"either": either, "record": form.instance_class, "__name__": __name__}
+    exec(f"def body(first, left, right): return record({fields})", names)
     body_of_record: Callable[..., Any] = names["body"]
     return body_of_record
 
@@ -365,11 +365,11 @@ def _payload(data: bytes, key: tuple[Any, ...]) -> tuple[Any, ...]:
     return compiled
 
 
-def _text(of: Any) -> str:
+def _text(form: Any) -> str:
     """Types of a signature by names that distinguish named tuples of one name from different modules."""
-    if isinstance(of, types.NamedTuple | types.NamedUniTuple):
-        kind = of.instance_class
-        return f"{kind.__module__}.{kind.__qualname__}({', '.join(map(_text, of.types))})"
-    if isinstance(of, tuple):
-        return f"({', '.join(map(_text, of))})"
-    return str(of)
+    if isinstance(form, types.NamedTuple | types.NamedUniTuple):
+        kind = form.instance_class
+        return f"{kind.__module__}.{kind.__qualname__}({', '.join(map(_text, form.types))})"
+    if isinstance(form, tuple):
+        return f"({', '.join(map(_text, form))})"
+    return str(form)

@@ -79,8 +79,8 @@ class SettledPart(Part):
         self._optimize_final_module()
 
 
-def _holds_array(of: Any) -> bool:
-    return isinstance(of, types.Array) or any(map(_holds_array, getattr(of, "types", ())))
+def _holds_array(form: Any) -> bool:
+    return isinstance(form, types.Array) or any(map(_holds_array, getattr(form, "types", ())))
 
 
 @register_pass(mutates_CFG=True, analysis_only=False)
@@ -156,9 +156,9 @@ class KernelContext(CPUContext):
     @classmethod
     def of(cls, context: CPUContext) -> "KernelContext":
         """A copy of a context with this difference only."""
-        own = context.subtarget(data_model_manager=WHOLE)
-        own.__class__ = cls
-        return own
+        target = context.subtarget(data_model_manager=WHOLE)
+        target.__class__ = cls
+        return target
 
     def get_function(self, fn: Any, sig: Any, _firstcall: bool = True) -> Any:
         """Reads and writes of array items have unsigned indices; all other functions are numba's."""
@@ -178,9 +178,9 @@ class PartFlags(Flags):
     @functools.cache
     def of(flags: Flags) -> "PartFlags":
         """The one instance of these options."""
-        own: Any = PartFlags(flags)
-        own.no_compile = True
-        return own
+        copied: Any = PartFlags(flags)
+        copied.no_compile = True
+        return copied
 
     def copy(self) -> "PartFlags":
         """Itself."""
@@ -334,12 +334,12 @@ def self_test() -> None:
         return Probe(probe.factor * row_sum(row_of(probe, n)), probe.rows)
 
     @compiled(ENTRY, Entry)
-    def whole(probe, sums):
+    def scale_all(probe, sums):
         for n in range(len(sums)):
             sums[n] = scaled(probe, n).factor
         return scaled(probe, 0)
 
     sums, rows = np.zeros(2), np.array([[1.0, 2.0, 4.0], [0.5, -1.0, 8.0]])
-    first, same = whole(Probe(-2.0, rows), sums)
+    first, same = scale_all(Probe(-2.0, rows), sums)
     if sums.tolist() != [-14.0, -15.0] or first != -14.0 or not np.array_equal(same, rows):
         raise RuntimeError(f"the self-test of compiled code gave {sums.tolist()}")

@@ -157,8 +157,8 @@ def _next_bar(section: CageSection, material: Elastic, angle: float) -> Array:
 def _ring_part(section: CageSection, material: Elastic, chord: Array, rigid: tuple[float, float]) -> Array:
     """Stiffness [12, 12] of a piece of ring between two joints, rigid over a length [m] at its ends."""
     height, width = section.thickness, section.side_ring_width
-    whole = float(np.linalg.norm(chord))
-    length, shear = whole - sum(rigid), SHEAR_SHARE * material.shear_modulus * width * height
+    span = float(np.linalg.norm(chord))
+    length, shear = span - sum(rigid), SHEAR_SHARE * material.shear_modulus * width * height
     axial = Beam(length, material.modulus * height * width**3 / 12.0, shear)
     radial = Beam(length, material.modulus * width * height**3 / 12.0, shear)
     local = np.zeros((12, 12))
@@ -168,7 +168,7 @@ def _ring_part(section: CageSection, material: Elastic, chord: Array, rigid: tup
     local[np.ix_([1, 5, 7, 11], [1, 5, 7, 11])] = beam_stiffness(radial)
     mirror = np.diag([1.0, -1.0, 1.0, -1.0])
     local[np.ix_([2, 4, 8, 10], [2, 4, 8, 10])] = mirror @ beam_stiffness(axial) @ mirror
-    axis, up = chord / whole, np.array([0.0, 0.0, 1.0])
+    axis, up = chord / span, np.array([0.0, 0.0, 1.0])
     frame = np.array([axis, np.cross(up, axis), up])
     ends = np.zeros((12, 12))
     for end, arm in enumerate((rigid[0] * axis, -rigid[1] * axis)):

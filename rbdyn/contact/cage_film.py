@@ -132,9 +132,9 @@ def film_shape(entrainment, squeeze):
     rolling_odd = fma(q, fma(q, fma(q, -0.003514312274, 0.005046344219), -0.00678407838), 0.06950470557)
     shear_even = fma(q, fma(q, fma(q, -0.19791307, -0.00779131131), 0.877740417), 2.46133412)
     shear_odd = fma(q, fma(q, fma(q, -0.740088974, 1.94378141), -1.9319692), 0.728276131)
-    rest = 1.0 + s
-    push = size * (rest * rest * rest) * fma(s, push_odd, push_even)
-    return push, entrainment * rest * fma(s, rolling_odd, rolling_even), fma(s, shear_odd, shear_even)
+    outer = 1.0 + s
+    push = size * (outer * outer * outer) * fma(s, push_odd, push_even)
+    return push, entrainment * outer * fma(s, rolling_odd, rolling_even), fma(s, shear_odd, shear_even)
 
 
 @kernel

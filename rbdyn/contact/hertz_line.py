@@ -75,7 +75,7 @@ class LogarithmicLineContact(NamedTuple):
 class SlicedLineContact(NamedTuple):
     """Equal slices, each relieved by the roller's profile: Q = sum_k Q_whole(delta - P_k)/m."""
 
-    whole: Any
+    line: Any
     relief: Array  # profile drop at the slice centres [m], padded to whole vectors
     share: Array  # 1/m; 0 in the padding
 
@@ -83,7 +83,7 @@ class SlicedLineContact(NamedTuple):
 class TiltedLineContact(NamedTuple):
     """Slices between races of different tilt: delta_k = delta + x_k theta cos(psi - psi_0) - P_k."""
 
-    whole: Any
+    line: Any
     relief: Array  # [m]
     share: Array
     rise: Array  # x_k theta [m]
@@ -132,7 +132,7 @@ def dowson_higginson(equivalent_modulus: float, length: float, gamma: float) -> 
 
 
 def slice_contact(
-    whole: Any, relief: Array, position: Array, tilt: float, direction: float
+    line: Any, relief: Array, position: Array, tilt: float, direction: float
 ) -> SlicedLineContact | TiltedLineContact:
     """Cut a plain law into slices with profile drops and axial positions [m], tilted by ``tilt`` [rad].
 
@@ -142,9 +142,9 @@ def slice_contact(
     drop = np.concatenate((relief, np.zeros(padding)))
     share = np.concatenate((np.full(len(relief), 1.0 / len(relief)), np.zeros(padding)))
     if tilt == 0.0:
-        return SlicedLineContact(whole, drop, share)
+        return SlicedLineContact(line, drop, share)
     rise = np.concatenate((position * tilt, np.zeros(padding)))
-    return TiltedLineContact(whole, drop, share, rise, math.cos(direction), math.sin(direction))
+    return TiltedLineContact(line, drop, share, rise, math.cos(direction), math.sin(direction))
 
 
 @law
@@ -279,7 +279,7 @@ def sum_of_slices(contact, overlap, nx, ny):
     load = stiffness = weighted = raised = 0.0
     for k in range(contact.share.size):
         own_overlap = overlap - slice_drop(contact, k, nx, ny)
-        own_load, own_stiffness, approach = closed_load(contact.whole, own_overlap)
+        own_load, own_stiffness, approach = closed_load(contact.line, own_overlap)
         own_stiffness = 0.0 if own_overlap <= 0.0 else contact.share[k] * own_stiffness
         load = reordered_sum(load, contact.share[k] * own_load)
         stiffness = reordered_sum(stiffness, own_stiffness)
@@ -367,7 +367,7 @@ def energy_of_slices(contact, overlap, nx, ny):
     """``line_energy`` of a sliced roller."""
     energy = 0.0
     for k in range(contact.share.size):
-        energy += contact.share[k] * closed_energy(contact.whole, overlap - slice_drop(contact, k, nx, ny))
+        energy += contact.share[k] * closed_energy(contact.line, overlap - slice_drop(contact, k, nx, ny))
     return energy
 
 

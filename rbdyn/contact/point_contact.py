@@ -43,7 +43,7 @@ class Ellipse(NamedTuple):
     first: float  # K(m), m = 1 - 1/k^2
     second: float  # E(m)
     curvature_difference: float  # F of this k
-    curvature_rest: float  # 1 - F
+    curvature_complement: float  # 1 - F
 
 
 @kernel
@@ -66,8 +66,8 @@ def ellipse(log_ellipticity: float) -> Ellipse:
     if m == 0.0:
         return Ellipse(first, first, 0.0, 1.0)
     difference = (0.5 * m * m - (2.0 - m) * squares) / (m * share)
-    rest = 2.0 * complement * (0.5 * m + squares) / (m * share)
-    return Ellipse(first, first * share, difference, rest)
+    complement_share = 2.0 * complement * (0.5 * m + squares) / (m * share)
+    return Ellipse(first, first * share, difference, complement_share)
 
 
 @entry
@@ -83,7 +83,7 @@ def _shape(curvature_difference: float) -> tuple[float, Ellipse]:
     last, now, last_miss = 0.0, target / 1.5, -target
     for _ in range(50):
         shape = ellipse(now)
-        miss = math.log1p(2.0 * shape.curvature_difference / shape.curvature_rest) - target
+        miss = math.log1p(2.0 * shape.curvature_difference / shape.curvature_complement) - target
         if miss == last_miss:
             break
         step = miss * (now - last) / (miss - last_miss)

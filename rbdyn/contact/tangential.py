@@ -119,16 +119,16 @@ def _(tangential, steady, coefficient, load, slip, stiffness):
     secant = abs(steady.coefficient) * load
     along = min(max(steady.growth * load, 0.0), secant)
     rise, last = max(secant, shortest), max(along, shortest)
-    whole, end, both = rise + damping, last + damping, rise + last
+    total, end, both = rise + damping, last + damping, rise + last
     limit, size = max(abs(steady.coefficient), SMALLEST_COEFFICIENT), abs(coefficient)
     within, lack = min(size, limit), limit - min(size, limit)
     # The share of the slip in creep is within/limit over curve/base.
-    ending, more = end * limit, (whole - end) * lack
+    ending, more = end * limit, (total - end) * lack
     base = last * ending * ending
-    curve = last * ending * (ending + more) + (last - along) * whole * lack * more
-    factor = whole * end
+    curve = last * ending * (ending + more) + (last - along) * total * lack * more
+    factor = total * end
     inverse = 1.0 / (factor * both * curve)
-    seen = within * base * end * both * inverse + (size - within) * whole * both * curve * inverse
+    seen = within * base * end * both * inverse + (size - within) * total * both * curve * inverse
     share = steady.coefficient * end * both * curve * inverse - math.copysign(seen, coefficient)
     at_once = damping + rise * (both - secant - along) * factor * curve * inverse
     engaged = min(max(load * tangential.light_density, 0.0), 1.0)

@@ -48,8 +48,8 @@ def count(text: str, least: int = 3, largest: int = 500) -> int:
     """A whole number of rolling elements. Raises MethodError."""
 
     def fault(value: float) -> str | None:
-        whole = value.is_integer() and least <= value <= largest
-        return None if whole else f"must be a whole number from {least} to {largest}; fix it"
+        valid = value.is_integer() and least <= value <= largest
+        return None if valid else f"must be a whole number from {least} to {largest}; fix it"
 
     return int(plain_number(text, fault=fault))
 

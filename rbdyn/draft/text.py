@@ -56,17 +56,17 @@ def tables_of(designation: str) -> dict[str, Any]:
 
 def scene_text(words: str, options: Options) -> str:
     """The commented scene that designation and options ask for, checked. Raises InputError with all faults at once."""
-    first, _, rest = words.strip().partition(" ")
-    own = first.lower() == OWN
-    subject = own_subject(rest.strip(), options) if own else _catalogue_bearing(words, options)
+    first, _, inside = words.strip().partition(" ")
+    is_own = first.lower() == OWN
+    subject = own_subject(inside.strip(), options) if is_own else _catalogue_bearing(words, options)
     rollers = subject.kind == ROLLERS
-    cause = f"--clearance {subject.clearance}" if own else f"DESIGNATION {one_line(words, LONGEST_NAME)}"
+    cause = f"--clearance {subject.clearance}" if is_own else f"DESIGNATION {one_line(words, LONGEST_NAME)}"
     values = _or_fault(cause, lambda: (roller_values if rollers else ball_values)(subject, options))
     template = Path(__file__).with_name("roller_scene.toml" if rollers else "ball_scene.toml")
     text = fill_template(template.read_text(encoding="utf-8"), values | _mounting(subject, options))
     # What is wrong with an estimate comes from the sizes that were given.
     sizes = " ".join(options.typed(*SIZES))
-    source = f"{sizes}: estimated inside" if sizes and not own else OWN if own else f"DESIGNATION {subject.name}"
+    source = f"{sizes}: estimated inside" if sizes and not is_own else OWN if is_own else f"DESIGNATION {subject.name}"
     try:
         scene = Scene.from_dict(tomllib.loads(text), source)
         notes = [*getattr(scene, "unit_notes", ())]

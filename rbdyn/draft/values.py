@@ -262,7 +262,7 @@ def ball_values(subject: Subject, options: Options) -> Values:
     """Values of ``ball_scene.toml``. Raises ValueError as ``roller_values``."""
     from rbdyn.life.balls import dynamic_capacity
 
-    inside, own = subject.inside, subject.grooves is not None
+    inside, is_own = subject.inside, subject.grooves is not None
     assert isinstance(inside, catalogue.BallInterior)
     deep, angle = inside.contact_angle is None, math.radians(inside.contact_angle or 0.0)
     sizes = inside.balls, inside.ball_diameter * 1e-3, inside.pitch_diameter * 1e-3, angle
@@ -277,8 +277,8 @@ def ball_values(subject: Subject, options: Options) -> Values:
         "ratings": _rated(subject, capacity),
         "inner_groove_factor": inner,
         "outer_groove_factor": outer,
-        "inner_groove_by": STATED if own else "assumed: as ISO 281 rates; 0.515 to 0.525",
-        "outer_groove_by": STATED if own else "assumed: as ISO 281 rates; 0.52 to 0.54",
+        "inner_groove_by": STATED if is_own else "assumed: as ISO 281 rates; 0.515 to 0.525",
+        "outer_groove_by": STATED if is_own else "assumed: as ISO 281 rates; 0.52 to 0.54",
         "preload": preload,
         "preload_by": "assumed: loads half of the balls, 1.216 F_r tan(contact angle), or 0.01 C" if assumed else "",
     }

@@ -163,7 +163,7 @@ def simulate_duty(
     results = _results(duty, scenes, partial(simulate, workers=workers, target=target), progress, notice)
     shares = shares_of_time(duty)
     hot = [_hot(at_point, result) for at_point, result in zip(scenes, results.values(), strict=True)]
-    cases = [None if one is None else load_case(one, share) for one, share in zip(hot, shares, strict=True)]
+    cases = [None if heat is None else load_case(heat, share) for heat, share in zip(hot, shares, strict=True)]
     known = [case for case in cases if case is not None]
     life = duty_life(known, ROLLER_EXPONENT) if len(known) == len(cases) else None
     short = () if life is None else life_notes(life.hours, sum(point.share for point in duty))
@@ -252,7 +252,7 @@ def worst_of(points: Mapping[str, Mapping[str, Quantity]]) -> dict[str, Worst]:
     """The worst point of each figure that all points have; none of those that are equal everywhere, and none of one point."""
     found = {}
     for name in next(iter(points.values()), {}):
-        figures = {point: own[name] for point, own in points.items() if name in own}
+        figures = {point: listed[name] for point, listed in points.items() if name in listed}
         values = {figure.value for figure in figures.values()}
         if name not in WORST or len(figures) < len(points) or len(values) < 2:
             continue

@@ -89,7 +89,7 @@ def run_all(
     """
     workers = threads_of(workers)
     pool = ThreadPoolExecutor(workers)
-    first, rest, places = deque[Callable[[], T]](), iter(runs), itertools.count()
+    first, waiting, places = deque[Callable[[], T]](), iter(runs), itertools.count()
     pending: dict[Future[T], tuple[int, Callable[[], T]]] = {}
 
     def hand_over(futures: Iterable[Future[T]]) -> None:
@@ -102,7 +102,7 @@ def run_all(
             first.extend(collect(outcome) or ())
 
     def next_run() -> Callable[[], T] | None:
-        return first.popleft() if first else next(rest, None)
+        return first.popleft() if first else next(waiting, None)
 
     try:
         while True:

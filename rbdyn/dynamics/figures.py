@@ -273,8 +273,8 @@ def quantile(sums: Array) -> Array:
     counts = sums[..., 2:]
     shares = np.cumsum(counts, axis=-1) / np.maximum(sums[..., :1], 1.0)
     place = np.argmax(shares >= SAMPLE_QUANTILE - 1e-12, axis=-1)[..., None]
-    own = np.maximum(np.take_along_axis(counts, place, -1) / np.maximum(sums[..., :1], 1.0), 1e-300)
-    inside = 1.0 - (np.take_along_axis(shares, place, -1) - SAMPLE_QUANTILE) / own
+    step = np.maximum(np.take_along_axis(counts, place, -1) / np.maximum(sums[..., :1], 1.0), 1e-300)
+    inside = 1.0 - (np.take_along_axis(shares, place, -1) - SAMPLE_QUANTILE) / step
     values = SAMPLE_LOWEST * 10.0 ** ((place + np.clip(inside, 0.0, 1.0)) / SAMPLE_STEPS)
     # The first step holds all that is smaller.
     return np.where((sums[..., 0] > 0.5) & (place[..., 0] > 0), values[..., 0], 0.0)

@@ -74,7 +74,7 @@ def at_temperatures_with_errors(
                 else None
                 for name, value in at.items()
             }
-    freedom = min((one.degrees_of_freedom for one in temperatures.values() if one.degrees_of_freedom), default=None)
+    freedom = min((node.degrees_of_freedom for node in temperatures.values() if node.degrees_of_freedom), default=None)
     return {
         name: replace(
             figure,

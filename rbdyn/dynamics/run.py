@@ -285,8 +285,8 @@ def cheaper_method(
 
 def _copy(carry: Carry) -> Carry:
     """A copy that shares only the work space."""
-    own: dict[str, Any] = {name: part.copy() for name, part in carry._asdict().items() if isinstance(part, np.ndarray)}
-    return carry._replace(**own)
+    data: dict[str, Any] = {key: part.copy() for key, part in carry._asdict().items() if isinstance(part, np.ndarray)}
+    return carry._replace(**data)
 
 
 def held_by_stability(stiffness: Sequence[float] | np.ndarray) -> float:

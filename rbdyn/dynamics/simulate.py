@@ -138,9 +138,9 @@ def _ensemble(
         _prepared.add(laws)
     started, compiled_s = time.perf_counter(), COMPILING.seconds
     # A replicate that fails stops those of its own scene alone.
-    own = Stop(outer=stop)
+    ending = Stop(outer=stop)
     begin = partial(recording_of, scene, bearing, pace, starts=starts)
-    ensemble = run_until_settled(scene, begin, workers, progress, own, pace)
+    ensemble = run_until_settled(scene, begin, workers, progress, ending, pace)
     # A method that a run tries, and this run first, is compiled then.
     more_s = COMPILING.seconds - compiled_s
     return ensemble, {"wall_s": time.perf_counter() - started - more_s, "compile_s": compile_s + more_s}

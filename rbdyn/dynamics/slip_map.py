@@ -232,7 +232,7 @@ class Series:
         return Point(speed, load, status_of(notes), shown, power_gap, notes or None, found, self.at)
 
     def _ended(self, plan: Companions | None) -> list[Replicate]:
-        return [run for (of, _), run in sorted(self.runs.items(), key=lambda item: item[0][1]) if of == plan]
+        return [run for (owner, _), run in sorted(self.runs.items(), key=lambda item: item[0][1]) if owner == plan]
 
 
 def slip_map(
@@ -274,8 +274,8 @@ def slip_map(
         else:
             scenes[place] = hot
     series = [Series(place, at[place], point, stop, pace) for place, point in enumerate(scenes) if place not in points]
-    for one in series[:1]:
-        prepare(one.scene, one.bearing)
+    for plan in series[:1]:
+        prepare(plan.scene, plan.bearing)
     total, ended = len(series) * (numerics.replicates + numerics.companions), 0
 
     def collect(outcome: Outcome[Replicate]) -> list[Job]:
@@ -292,7 +292,7 @@ def slip_map(
         return more
 
     started = time.perf_counter()
-    run_all((job for one in series for job in one.replicates()), workers, stop, collect)
+    run_all((job for member in series for job in member.replicates()), workers, stop, collect)
     wall_s = time.perf_counter() - started
     ordered = tuple(points[place] for place in range(len(scenes)))
     axes = dict(zip(keys, (tuple(columns), tuple(rows)), strict=True))

@@ -46,7 +46,7 @@ from rbdyn.scene.input_ranges import Ranges, input_ranges
 from rbdyn.scene.notes import heat_notes
 from rbdyn.scene.thermal import Temperatures, Thermal, at_temperatures, ceilings, inlet_temperature, part_temperatures
 from rbdyn.thermal.fixed_point import CLEAR, VAGUE, State, learned, model_of, next_step, steady_state
-from rbdyn.thermal.losses import HOTTEST, HeatModel, gain, log_viscosity, no_rest
+from rbdyn.thermal.losses import HOTTEST, HeatModel, gain, log_viscosity, no_residue
 from rbdyn.thermal.network import NODES, carried_off
 
 POWER_LOSS = "power_loss_W"
@@ -212,7 +212,7 @@ def measured_slopes(balance: Balance, state: State, near: HeatModel) -> tuple[Ar
     ring alone; the other nodes follow where the gain is near one. A warmer ring that makes the bearing impossible is replaced by a
     colder one.
     """
-    slopes = near._replace(rest=no_rest()).image_slopes(state.temperatures)
+    slopes = near._replace(residue=no_residue()).image_slopes(state.temperatures)
     if near.rise(state.temperatures) < WARMER:
         return slopes, 0.0
     alone = np.eye(len(NODES))

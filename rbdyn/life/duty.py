@@ -126,7 +126,7 @@ def duty_life(cases: Sequence[LoadCase], exponent: float) -> DutyLife:
         equivalent_load=equivalent_load(cases, exponent),
         mean_speed=mean_speed,
         point_hours=tuple(case.hours for case in cases),
-        damage=tuple(one / rate if rate > 0.0 else 0.0 for one in rates),
+        damage=tuple(value / rate if rate > 0.0 else 0.0 for value in rates),
     )
 
 

@@ -192,9 +192,9 @@ def reference_life(
 
     def equivalent(loads: Array, turns: bool) -> float:
         lamina = turning_race_load(loads) if turns else standing_race_load(loads, angle, positions)
-        whole = float(np.sum((factor * lamina) ** LAMINA_EXPONENT) ** (1.0 / LAMINA_EXPONENT))
+        load = float(np.sum((factor * lamina) ** LAMINA_EXPONENT) ** (1.0 / LAMINA_EXPONENT))
         # A lamina has the share n^(-7/9) of the capacity of its roller; the result refers to the whole roller.
-        return whole * slices ** (7.0 / 9.0)
+        return load * slices ** (7.0 / 9.0)
 
     inner_load = equivalent(inner, turning != "outer")
     outer_load = equivalent(outer, turning != "inner")

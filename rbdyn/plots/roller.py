@@ -54,10 +54,10 @@ SMALLEST_SHARE = 1e-4
 
 def _guide_circle(axis: Axes, history: "History") -> None:
     clearance = history.scene.orbit_play_m
-    of = "pocket" if history.scene.guide_clearance_m is None else "diametral guide"
+    kind = "pocket" if history.scene.guide_clearance_m is None else "diametral guide"
     angle = np.linspace(0.0, 2.0 * np.pi, 361)
     x, y = clearance * 1e6 * np.cos(angle), clearance * 1e6 * np.sin(angle)
-    axis.plot(x, y, "--", color=GREY, linewidth=0.9, label=f"half of the {of} clearance")
+    axis.plot(x, y, "--", color=GREY, linewidth=0.9, label=f"half of the {kind} clearance")
 
 
 def _plane(axis: Axes) -> None:
@@ -103,10 +103,10 @@ def _orbit_spectrum(axis: Axes, history: "History", colour: str) -> None:
     near = abs(order) <= 1.2 * max(map(abs, passing))
     axis.semilogy(order[near], 1e6 * amplitude[near], color=colour, linewidth=0.8)
     marks = {name: (at,) for name, at in forced_orders(history.scene, speed).items()} | {"roller pass": passing}
-    for (name, places), own in zip(marks.items(), (ORANGE, VERMILION, SKY, GREY), strict=False):
+    for (name, places), shade in zip(marks.items(), (ORANGE, VERMILION, SKY, GREY), strict=False):
         for place in places:
-            axis.axvline(place, color=own, linewidth=0.9, linestyle="--", zorder=1)
-        axis.plot([], [], "--", color=own, label=f"{name} {', '.join(f'{place:.3g}' for place in places)}")
+            axis.axvline(place, color=shade, linewidth=0.9, linestyle="--", zorder=1)
+        axis.plot([], [], "--", color=shade, label=f"{name} {', '.join(f'{place:.3g}' for place in places)}")
     axis.set(xlabel="order: turns of the orbit in a cage turn", ylabel="radius of the circle [µm]")
     axis.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=len(marks), fontsize=8, frameon=False)
     plain(axis)
@@ -270,8 +270,8 @@ def sliding(history: "History", path: Path) -> None:
 
 def power_by_loss(terms: Mapping[str, float], path: Path) -> None:
     """Mean power [W] of each loss, largest on top, without those below a ten-thousandth of all."""
-    whole = sum(abs(power) for power in terms.values())
-    largest = {term: power for term, power in terms.items() if abs(power) > SMALLEST_SHARE * whole}
+    total = sum(abs(power) for power in terms.values())
+    largest = {term: power for term, power in terms.items() if abs(power) > SMALLEST_SHARE * total}
     names = sorted(largest, key=lambda term: largest[term])
     figure, axis = plt.subplots(figsize=(7.0, 1.2 + 0.38 * max(len(names), 1)))
     bars = axis.barh([name.replace("_", " ") for name in names], [largest[name] for name in names], color=BLUE)

@@ -175,14 +175,14 @@ def read_designation(text: str) -> Designation:
     """
     plain = " ".join(text.split())
     shape = SHAPE.fullmatch(plain) if len(plain) <= LONGEST else None
-    letters, prefix, digits, rest = ((shape.group(k) or "").upper() for k in (1, 2, 3, 4)) if shape else [""] * 4
+    letters, prefix, digits, ending = ((shape.group(k) or "").upper() for k in (1, 2, 3, 4)) if shape else [""] * 4
     series, code = digits[:-2], digits[-2:]
     if prefix.startswith("HC"):
         raise MethodError(f"prefix {prefix} {REFUSED['ceramic']}")
     for kind, series_of_kind in SERIES.items():
         if bool(letters) == (kind == ROLLERS) and series in series_of_kind:
             form = FORMS[kind].replace("[ABC]", "[ABCE]", 1) if prefix == "B" else FORMS[kind]
-            read = [_read(word, kind, form) for word in BETWEEN.split(rest) if word]
+            read = [_read(word, kind, form) for word in BETWEEN.split(ending) if word]
             suffixes = tuple(suffix for _, features in read for suffix in features)
             suffixes += (Suffix("seal", prefix, prefix),) if prefix == "S" else ()
             _check(suffixes)
@@ -384,8 +384,8 @@ def roller_interior(sizes: Envelope, narrow: bool) -> RollerInterior:
     else:
         share, error = (NARROW_LENGTH_SHARE, 30) if narrow else (LENGTH_SHARE, 20)
         length, along = share * sizes.width, f"estimated: {share:g} of the width, +-{error} %"
-    whole = min(length + 0.1 * diameter, 0.95 * sizes.width)
-    lengths = round(min(length, whole), 3), round(whole, 3)
+    overall = min(length + 0.1 * diameter, 0.95 * sizes.width)
+    lengths = round(min(length, overall), 3), round(overall, 3)
     return RollerInterior(rollers, diameter, round(pitch, 3), *lengths, by, around, along)
 
 

@@ -135,8 +135,8 @@ def _other_roots(scene: SingleRowScene, model: RowModel, solution: Solution) -> 
 def _solutions(start: Any, rows: int) -> tuple[Solution, ...]:
     """Solutions of the rows of a start, empty without one. Raises InputError."""
     starts = start.rows if isinstance(start, BallResult) else () if start is None else start
-    whole = isinstance(starts, tuple) and all(isinstance(row, Solution) for row in starts)
-    if not whole or len(starts) not in (0, rows):
+    are_solutions = isinstance(starts, tuple) and all(isinstance(row, Solution) for row in starts)
+    if not are_solutions or len(starts) not in (0, rows):
         raise InputError(
             [
                 f"start = {one_line(repr(start), LONGEST_NAME)}: must be a result of equilibrium of such a bearing, or the "
@@ -225,7 +225,7 @@ def _starts(row: Row, control: FixedShare | FrictionShare, load: Array, constrai
     ]
 
 
-def _differ(one: Solution, other: Solution) -> bool:
-    touching = (one.inner_load > 0.0) & (other.inner_load > 0.0)
-    apart = np.abs(one.inner_angle - other.inner_angle)[touching]
-    return bool(np.any((one.inner_load > 0.0) != (other.inner_load > 0.0)) or np.any(apart > SAME))
+def _differ(first: Solution, second: Solution) -> bool:
+    touching = (first.inner_load > 0.0) & (second.inner_load > 0.0)
+    apart = np.abs(first.inner_angle - second.inner_angle)[touching]
+    return bool(np.any((first.inner_load > 0.0) != (second.inner_load > 0.0)) or np.any(apart > SAME))

@@ -109,9 +109,9 @@ class DoubleDeckerSolution(NamedTuple):
         to_inner, free = plane_transfer(self.stack.arm_0), self.free
         # Balance of the middle ring: (K_o + G T) dq_m = G dq with G the derivative of its load.
         onto_by = _onto_by_relative(self.stack, self.inner)
-        whole = (self.outer.stiffness + onto_by @ to_inner)[np.ix_(free, free)]
+        stiffness = (self.outer.stiffness + onto_by @ to_inner)[np.ix_(free, free)]
         follows = np.zeros((5, 5))
-        follows[free] = np.linalg.lstsq(whole, onto_by[free], rcond=1e-12)[0]
+        follows[free] = np.linalg.lstsq(stiffness, onto_by[free], rcond=1e-12)[0]
         joint = self.inner.stiffness @ (np.eye(5) - to_inner @ follows)
         return without_noise(joint, np.abs(joint).max())
 
@@ -396,33 +396,33 @@ def balanced_split(
     root; without a root a layer stands. Speeds [rad/s] have either sign. Drag on the middle ring and the torque of its
     seals are omitted, as in Hu et al.
     """
-    whole = inner_speed - outer_speed
-    if whole == 0.0:
+    difference = inner_speed - outer_speed
+    if difference == 0.0:
         return SpeedSplit(inner_speed, math.nan, 0.0, "no relative speed")
 
     def surplus(share: float) -> float:
-        return inner.torque((1.0 - share) * whole) - outer.torque(share * whole)
+        return inner.torque((1.0 - share) * difference) - outer.torque(share * difference)
 
     def split(share: float, torque: float, status: Status) -> SpeedSplit:
         # Where a layer stands, the speed is exactly that of a ring.
-        speed = inner_speed if share == 1.0 else outer_speed + share * whole
-        return SpeedSplit(speed, share, math.copysign(torque, whole), status)
+        speed = inner_speed if share == 1.0 else outer_speed + share * difference
+        return SpeedSplit(speed, share, math.copysign(torque, difference), status)
 
     first, last = surplus(0.0), surplus(1.0)
     if first == last == 0.0:
         share = oil_share(inner.pitch_diameter, outer.pitch_diameter)
         return split(share, inner.torque(0.0), "undetermined")
     if first <= 0.0:
-        return split(0.0, inner.torque(whole), "outer layer stands")
+        return split(0.0, inner.torque(difference), "outer layer stands")
     if last >= 0.0:
-        return split(1.0, outer.torque(whole), "inner layer stands")
+        return split(1.0, outer.torque(difference), "inner layer stands")
     low, high = 0.0, 1.0
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
         if middle in (low, high):
             break
         low, high = (middle, high) if surplus(middle) > 0.0 else (low, middle)
-    return split(high, outer.torque(high * whole), "shared")
+    return split(high, outer.torque(high * difference), "shared")
 
 
 class DoubleDeckerModel(NamedTuple):
@@ -475,14 +475,14 @@ def double_decker_of(scene: DoubleDeckerScene) -> DoubleDeckerModel:
 def middle_speed(scene: DoubleDeckerScene) -> SpeedSplit:
     """Speed of the middle ring: stated, by oil alone (Hu et al., eq 13), or by the torques of oil and load."""
     middle, (inner_speed, outer_speed) = scene.bearing.middle, scene.operation.speeds
-    whole = inner_speed - outer_speed
+    difference = inner_speed - outer_speed
     if middle.speed is not None:
-        share = (middle.speed - outer_speed) / whole if whole != 0.0 else math.nan
+        share = (middle.speed - outer_speed) / difference if difference != 0.0 else math.nan
         return SpeedSplit(middle.speed, share, math.nan, "given")
     if middle.speed_split == "oil":
         share = oil_share(1.0, scene.bearing.pitch_ratio)
-        status: Status = "shared" if whole != 0.0 else "no relative speed"
-        return SpeedSplit(outer_speed + share * whole, share, math.nan, status)
+        status: Status = "shared" if difference != 0.0 else "no relative speed"
+        return SpeedSplit(outer_speed + share * difference, share, math.nan, status)
     return balanced_split(*layer_frictions(scene), inner_speed, outer_speed)
 
 

@@ -85,11 +85,11 @@ def forces(control: Any, system: Any, u: Any, residual: Any, jacobian: Any) -> t
         q[free[k]] = u[ring + k]
         residual[ring + k] = load[free[k]]
         largest = max(largest, abs(load[free[k]]))
-    one = 1.0 / row.lever
+    inv = 1.0 / row.lever
     for j in range(row.cosine.size):
         c, s = row.cosine[j], row.sine[j]
         # Factors of a ball's axial force, radial force and couple in each component.
-        axial, radial, couple = ((0.0, 0.0, 1.0, s, -c), (c, s, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, s * one, -c * one))
+        axial, radial, couple = ((0.0, 0.0, 1.0, s, -c), (c, s, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, s * inv, -c * inv))
         a_axial, a_radial = groove_centre(row, q, j)
         x, y = u[2 * j], u[2 * j + 1]
         inner = deflection(a_axial - x, a_radial - y, row.inner_reach[j])

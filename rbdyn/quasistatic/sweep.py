@@ -490,9 +490,9 @@ def snake(axes: Axes) -> list[tuple[int, ...]]:
 
 def scenes(scene: BallScene, axes: Axes, order: Order) -> Iterator[tuple[tuple[float, ...], BallScene]]:
     """Values and validated scene of each point. Raises InputError naming an invalid point."""
-    whole, kind = tables(scene), type(scene)
-    # Tables without a swept key are valid already; the others remain parts of ``whole``, which names them in a fault.
-    touched = {name: whole.setdefault(name, {}) for name in (str(axis.path[0]) for axis in axes)}
+    stated, kind = tables(scene), type(scene)
+    # Tables without a swept key are valid already; the others remain parts of ``stated``, which names them in a fault.
+    touched = {name: stated.setdefault(name, {}) for name in (str(axis.path[0]) for axis in axes)}
     data = {name: getattr(scene, name) for name in kind.model_fields} | touched
     holders = [_holder(data, axis.path) for axis in axes]
     for indices in order:
@@ -502,8 +502,8 @@ def scenes(scene: BallScene, axes: Axes, order: Order) -> Iterator[tuple[tuple[f
         try:
             point = kind.model_validate(data)
         except ValidationError:
-            named = ", ".join(f"{axis.key} = {value:g}" for axis, value in zip(axes, values, strict=True))
-            point = validated(kind, whole, f"sweep point ({named})")
+            place = ", ".join(f"{axis.key} = {value:g}" for axis, value in zip(axes, values, strict=True))
+            point = validated(kind, stated, f"sweep point ({place})")
         yield values, point
 
 

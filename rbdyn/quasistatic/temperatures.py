@@ -52,7 +52,7 @@ from rbdyn.scene.thermal import Temperatures, Thermal, inlet_temperature, oil_ce
 from rbdyn.thermal.conductances import half_space_contact, oil_flow, seats, sump, surface_coefficient
 from rbdyn.thermal.fixed_point import Search, State, model_of, steady_state
 from rbdyn.thermal.heat import TERMS, Effusivities, shares
-from rbdyn.thermal.losses import HeatModel, Losses, gain, log_viscosity, no_rest
+from rbdyn.thermal.losses import HeatModel, Losses, gain, log_viscosity, no_residue
 from rbdyn.thermal.network import NODES, OIL, Boundaries, Conductances, carried_off, temperatures
 
 # Series of SKF's table 3a by the diameter series of ISO 15.
@@ -279,7 +279,7 @@ def balance(scene: SingleRowScene, nodes: Array, viscosity: Array | None = None)
     exponents = np.array([ROLLING_POWER * term.endswith("rolling_resistance") for term in TERMS])
     viscosity = log_viscosity(scene.lubricant.at) if viscosity is None else viscosity
     losses = Losses(nodes, found.powers, exponents, films, viscosity)
-    model = HeatModel(losses, found.shares, found.conductances, found.boundaries, no_rest())
+    model = HeatModel(losses, found.shares, found.conductances, found.boundaries, no_residue())
     image = temperatures(found.conductances, found.boundaries, found.heat)
     return State(nodes, image, np.zeros(len(NODES)), model, found)
 
@@ -398,7 +398,7 @@ def ranges_of(scene: SingleRowScene, state: State, slopes: Array) -> Ranges:
     about = state.model.with_image_slopes(slopes)
 
     def near(states: Sequence[State]) -> HeatModel:
-        return states[-1].model._replace(rest=about.rest)
+        return states[-1].model._replace(residue=about.residue)
 
     def full(thermal: Thermal, start: Array) -> Array | None:
         changed = scene.model_copy(update={"thermal": thermal})
@@ -472,11 +472,11 @@ def starvation_note(hot: SingleRowScene, subject: str) -> Notes:
     assert lubricant is not None and mounting is not None
     oil = lubricant.in_service
     sizes = mounting.bore, mounting.outside_diameter, inner - outer, oil.viscosity / oil.density
-    rest = starvation_factor(GEOMETRIES[hot.bearing.kind], *sizes, lubricant.supply)
-    if rest >= STARVED:
+    factor = starvation_factor(GEOMETRIES[hot.bearing.kind], *sizes, lubricant.supply)
+    if factor >= STARVED:
         return ()
     sentence = (
-        f"{subject}: SKF's starvation factor of {rest:.2g} removes the rolling friction of so thick an oil, so the heat is "
+        f"{subject}: SKF's starvation factor of {factor:.2g} removes the rolling friction of so thick an oil, so the heat is "
         "too low. Take a thinner oil or warm it"
     )
     return (Note("starved", sentence),)

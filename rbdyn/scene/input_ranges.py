@@ -173,11 +173,11 @@ def varied_inputs(thermal: "Thermal", sets: Mapping[str, Array], levels: Levels)
     start = thermal.start
     for place in range(SETS if sets else 1):
         values = {key: float(column[place]) for key, column in sets.items()}
-        own = {key.removeprefix("thermal."): value for key, value in values.items() if key not in levels}
-        widths = {key: own.pop(f"start.{key}") for key in STARTING if f"start.{key}" in own}
-        update = own if start is None else own | {"start": start.model_copy(update=widths)}
+        row = {key.removeprefix("thermal."): value for key, value in values.items() if key not in levels}
+        widths = {key: row.pop(f"start.{key}") for key in STARTING if f"start.{key}" in row}
+        update = row if start is None else row | {"start": start.model_copy(update=widths)}
         ratios = {
-            name: own[key] / getattr(thermal, key) for key, names in SCALED.items() if key in own for name in names
+            name: row[key] / getattr(thermal, key) for key, names in SCALED.items() if key in row for name in names
         }
         level = np.ones(len(TERMS))
         for key in sorted(set(levels) & set(values)):

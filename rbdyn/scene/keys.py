@@ -108,28 +108,28 @@ def schema(kinds: Mapping[str, type[BaseModel]]) -> dict[str, Any]:
     """JSON Schema of files that are one of the ``kinds``, every property described."""
     from pydantic.json_schema import models_json_schema
 
-    refs, whole = models_json_schema([(model, "validation") for model in kinds.values()])
+    refs, schemas = models_json_schema([(model, "validation") for model in kinds.values()])
     described: dict[str, dict[str, str]] = {}
     for model in _models(kinds.values()):
         # The schema prefixes a name that two modules use with the module.
         long_name = f"{model.__module__}__{model.__qualname__}".replace(".", "__")
-        name = model.__name__ if model.__name__ in whole["$defs"] else long_name
+        name = model.__name__ if model.__name__ in schemas["$defs"] else long_name
         described[name] = descriptions(model)
-    for name, table in whole["$defs"].items():
+    for name, table in schemas["$defs"].items():
         for key, node in table.get("properties", {}).items():
             node["description"] = described[name][key]
             node.pop("title", None)
             node.pop("pattern", None)  # in a dialect that editors cannot read
     options = [{"title": kind, **refs[(model, "validation")]} for kind, model in kinds.items()]
-    return {"$schema": DIALECT, "oneOf": options, "$defs": whole["$defs"]}
+    return {"$schema": DIALECT, "oneOf": options, "$defs": schemas["$defs"]}
 
 
 def keys(kinds: Mapping[str, type[BaseModel]]) -> list[Key]:
     """Keys of each kind of file; a key of several kinds with one meaning is listed once."""
-    whole = schema(kinds)
+    schemas = schema(kinds)
     by_meaning: dict[tuple[str, str], Key] = {}
-    for option in whole["oneOf"]:
-        for key in _keys_of(whole["$defs"], _target(option), "", option["title"]):
+    for option in schemas["oneOf"]:
+        for key in _keys_of(schemas["$defs"], _target(option), "", option["title"]):
             by_meaning.setdefault((key.key, key.description), key)
     return list(by_meaning.values())
 
@@ -184,7 +184,7 @@ def _keys_of(tables: Mapping[str, Any], name: str, prefix: str, file: str) -> It
         yield from _keys_of(tables, _target(free), f'{prefix}"TABLE.KEY".', file)
     for key, node in table["properties"].items():
         kinds = [kind for kind in node.get("anyOf", [node]) if kind.get("type") != "null"]
-        whole = f"{prefix}{key}"
+        path = f"{prefix}{key}"
         required = key in table.get("required", ())
         nested = [(kind, "") for kind in kinds if "$ref" in kind]
         nested += [(kind["items"], "[]") for kind in kinds if "$ref" in kind.get("items", {})]
@@ -193,9 +193,9 @@ def _keys_of(tables: Mapping[str, Any], name: str, prefix: str, file: str) -> It
             filter(None, [*map(_values, plain), *("list of tables" if mark else "table" for _, mark in nested)])
         )
         default = None if nested and not plain else node.get("default")
-        yield Key(whole, file, _unit(key), values, default, required, node["description"], _unknown(whole))
+        yield Key(path, file, _unit(key), values, default, required, node["description"], _unknown(path))
         for target, mark in nested:
-            yield from _keys_of(tables, _target(target), f"{whole}{mark}.", file)
+            yield from _keys_of(tables, _target(target), f"{path}{mark}.", file)
 
 
 def _unknown(key: str) -> str:
@@ -217,8 +217,8 @@ def _values(node: Mapping[str, Any]) -> str:
     kind = node.get("type")
     if kind == "array":
         items = node.get("items")
-        of = _plural(_values(items)) if items else f"{len(node['prefixItems'])} numbers"
-        return f"list of {of}" if of else "list"
+        items_text = _plural(_values(items)) if items else f"{len(node['prefixItems'])} numbers"
+        return f"list of {items_text}" if items_text else "list"
     return " ".join(filter(None, ["table" if kind == "object" else str(kind or ""), _range(node)]))
 
 

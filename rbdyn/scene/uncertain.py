@@ -191,17 +191,17 @@ class Uncertain(Strict):
 
         What this table states about a key, by a law, in ``estimated`` or in ``set``, replaces what ``base`` states about it.
         """
-        own, under = ({name: getattr(table, name) for name in table.model_fields_set} for table in (self, base))
+        upper, lower = ({name: getattr(table, name) for name in table.model_fields_set} for table in (self, base))
 
         def paths(assignments: list[str]) -> dict[str, str]:
             return {".".join(key_path(assignment)): assignment for assignment in assignments}
 
-        fixed = paths(own.get("set", []))
+        fixed = paths(upper.get("set", []))
         stated = {*self.laws, *self.estimated, *fixed}
         laws = {**{key: law for key, law in base.laws.items() if key not in stated}, **self.laws}
-        merged = {key: value for key, value in {**under, **own}.items() if key in type(self).model_fields} | laws
+        merged = {key: value for key, value in {**lower, **upper}.items() if key in type(self).model_fields} | laws
         merged["estimated"] = [key for key in base.estimated if key not in stated] + self.estimated
-        merged["set"] = [text for key, text in paths(under.get("set", [])).items() if key not in stated] + [
+        merged["set"] = [text for key, text in paths(lower.get("set", [])).items() if key not in stated] + [
             *fixed.values()
         ]
         return merged

@@ -156,5 +156,5 @@ def seats(bore: float, outside: float, width: float) -> tuple[float, float]:
     The heat of ISO 15312 at 50 K over pi B (D + d): 320 W/(m^2 K) up to 50 000 mm^2. The part of pi B D leaves by the housing, that of
     pi B d by the shaft. An actual housing differs by a factor of two (0.5 to 2).
     """
-    whole = seat_heat(math.pi * width * (bore + outside)) / SEAT_RISE
-    return whole * outside / (bore + outside), whole * bore / (bore + outside)
+    total = seat_heat(math.pi * width * (bore + outside)) / SEAT_RISE
+    return total * outside / (bore + outside), total * bore / (bore + outside)

@@ -19,7 +19,7 @@ import numpy as np
 from rbdyn.base.arrays import Array
 from rbdyn.base.faults import InputError
 from rbdyn.base.words import with_error
-from rbdyn.thermal.losses import HOTTEST, LONGEST_STEP, HeatModel, film_powers, gain, no_rest
+from rbdyn.thermal.losses import HOTTEST, LONGEST_STEP, HeatModel, film_powers, gain, no_residue
 
 Status = Literal["steady", "undecided", "no steady state", "seizure", "too hot"]
 # Most states of a search, and halvings of a step into an impossible state.
@@ -109,7 +109,9 @@ def model_of(states: Sequence[State]) -> HeatModel:
         if CLEAR * noise < np.abs(step).max() <= NEAR:
             steps.append(step)
             missing.append(other.model.matrix @ other.deviation - model.excess(other.temperatures))
-    return model._replace(rest=learned(no_rest(), np.array(steps), np.array(missing), ALIKE)) if steps else model
+    if not steps:
+        return model
+    return model._replace(residue=learned(no_residue(), np.array(steps), np.array(missing), ALIKE))
 
 
 def next_step(model: HeatModel, state: State, before: Array | None) -> Array:
@@ -123,7 +125,7 @@ def next_step(model: HeatModel, state: State, before: Array | None) -> Array:
     elif gain(slopes) < NEARLY_UNSTABLE:
         step = np.asarray(np.linalg.solve(np.eye(len(slopes)) - slopes, state.deviation), float)
     else:
-        step = model._replace(rest=no_rest()).balanced() - state.temperatures
+        step = model._replace(residue=no_residue()).balanced() - state.temperatures
     longest = LONGEST_STEP
     if before is not None and float(step @ before) < 0.0:
         longest = min(longest, 0.5 * float(np.abs(before).max()))

@@ -3,7 +3,7 @@
 A film's loss is P = P0 (eta/eta0)^p at the temperature of its surfaces. Oil that warms loses viscosity, so this heat falls while
 the heat carried off rises, and the balance has one solution. It lies above the coldest surroundings: no loss is negative, and the
 network only mixes temperatures. Newton's method comes to it by steps that never overshoot from the cold side, because the balance
-is concave there. Whatever else moves heat, such as lost clearance, is ``rest``, linear in the temperatures.
+is concave there. Whatever else moves heat, such as lost clearance, is ``residue``, linear in the temperatures.
 """
 
 from collections.abc import Callable, Mapping
@@ -76,13 +76,13 @@ def film_powers(losses: Losses, other: Losses, least_change: float, least_share:
 
 
 class HeatModel(NamedTuple):
-    """Losses about a state, ``shares`` (terms, 4) of the nodes in these, the network, and ``rest`` (4, 4) [W/K] of the heat's slopes."""
+    """Losses about a state, ``shares`` (terms, 4) of the nodes in these, the network, and ``residue`` (4, 4) [W/K] of the heat's slopes."""
 
     losses: Losses
     shares: Array
     conductances: Conductances
     boundaries: Boundaries
-    rest: Array
+    residue: Array
 
     @property
     def matrix(self) -> Array:
@@ -101,11 +101,11 @@ class HeatModel(NamedTuple):
 
     def heat(self, nodes: Array) -> Array:
         """Heat of the nodes (..., 4) [W] at their temperatures (..., 4) [C]."""
-        return np.asarray(self.losses.at(nodes) @ self.shares + (nodes - self.losses.temperatures) @ self.rest.T)
+        return np.asarray(self.losses.at(nodes) @ self.shares + (nodes - self.losses.temperatures) @ self.residue.T)
 
     def heat_slopes(self, nodes: Array) -> Array:
         """dQ/dT (..., 4, 4) [W/K]."""
-        return np.asarray(np.einsum("tn,...tm->...nm", self.shares, self.losses.slopes(nodes)) + self.rest)
+        return np.asarray(np.einsum("tn,...tm->...nm", self.shares, self.losses.slopes(nodes)) + self.residue)
 
     def excess(self, nodes: Array) -> Array:
         """Heat less what the network carries off (..., 4) [W]: zero where the heat balances."""
@@ -121,15 +121,15 @@ class HeatModel(NamedTuple):
 
     def with_image_slopes(self, slopes: Array) -> Self:
         """The model with the rest that gives it the slopes dM/dT at its state."""
-        viscous = self._replace(rest=np.zeros_like(self.rest)).heat_slopes(self.losses.temperatures)
-        return self._replace(rest=self.matrix @ slopes - viscous)
+        viscous = self._replace(residue=np.zeros_like(self.residue)).heat_slopes(self.losses.temperatures)
+        return self._replace(residue=self.matrix @ slopes - viscous)
 
     def balanced(self) -> Array:
         """Temperatures (4,) [C] that balance their heat, between the coldest surroundings and HOTTEST."""
-        whole, inflow, coldest = self.matrix, source(self.conductances, self.boundaries), self.coldest
+        matrix, inflow, coldest = self.matrix, source(self.conductances, self.boundaries), self.coldest
         nodes = np.clip(self.losses.temperatures, coldest, HOTTEST)
         for _ in range(MOST_STEPS):
-            step = np.linalg.solve(whole - self.heat_slopes(nodes), self.heat(nodes) + inflow - whole @ nodes)
+            step = np.linalg.solve(matrix - self.heat_slopes(nodes), self.heat(nodes) + inflow - matrix @ nodes)
             step *= min(1.0, LONGEST_STEP / max(float(np.abs(step).max()), LAST_STEP))
             before, nodes = nodes, np.clip(nodes + step, coldest, HOTTEST)
             if np.abs(nodes - before).max() < LAST_STEP:
@@ -153,6 +153,6 @@ def gain(slopes: Array) -> float:
     return float(np.linalg.eigvals(slopes).real.max())
 
 
-def no_rest() -> Array:
+def no_residue() -> Array:
     """Slopes of a balance that follows the viscosity alone (4, 4)."""
     return np.zeros((len(NODES), len(NODES)))

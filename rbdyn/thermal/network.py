@@ -110,8 +110,8 @@ def _parts(conductances: Conductances, boundaries: Boundaries) -> tuple[Array, A
         (OUTER, ROLLERS): g.outer_rollers,
         (INNER, ROLLERS): g.inner_rollers,
     }
-    for (one, other), value in pairs.items():
-        couplings[one, other] = couplings[other, one] = value
+    for (first, second), value in pairs.items():
+        couplings[first, second] = couplings[second, first] = value
     ways_out = np.array([g.flow + g.sump, g.outer_ambient, g.inner_ambient, 0.0])
     inflow = boundaries.ambient * ways_out
     inflow[OIL] += g.flow * (boundaries.inlet - boundaries.ambient)

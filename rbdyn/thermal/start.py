@@ -141,21 +141,21 @@ def padded(of_nodes: Array) -> Array:
 
 def warming_network(conductances: WarmingConductances, boundaries: Boundaries) -> tuple[Array, Array]:
     """G (6, 6) [W/K] and b (6,) [W] of ``WARMING_NODES``."""
-    g, whole = conductances, np.zeros((len(WARMING_NODES),) * 2)
+    g, couplings = conductances, np.zeros((len(WARMING_NODES),) * 2)
     inside = Conductances(
         g.flow, g.oil_outer, g.oil_inner, g.oil_rollers, g.outer_rollers, g.inner_rollers, 0.0, 0.0, g.sump
     )
-    whole[: len(NODES), : len(NODES)] = matrix(inside)
+    couplings[: len(NODES), : len(NODES)] = matrix(inside)
     inflow = np.append(source(inside, boundaries), [g.housing_ambient, g.shaft_ambient] * np.array(boundaries.ambient))
     for ring, part, between, outside in (
         (OUTER, HOUSING, g.outer_housing, g.housing_ambient),
         (INNER, SHAFT, g.inner_shaft, g.shaft_ambient),
     ):
-        whole[ring, ring] += between
-        whole[part, part] += between + outside
-        whole[ring, part] -= between
-        whole[part, ring] -= between
-    return whole, inflow
+        couplings[ring, ring] += between
+        couplings[part, part] += between + outside
+        couplings[ring, part] -= between
+        couplings[part, ring] -= between
+    return couplings, inflow
 
 
 class Course(NamedTuple):
@@ -388,9 +388,9 @@ def columns(
     }
 
 
-def slowest(capacities: Array, whole: Array) -> float:
+def slowest(capacities: Array, couplings: Array) -> float:
     """Time constant of the slowest mode of a network [s]: infinite where a node has no way out."""
-    rates = np.linalg.eigvals(whole / capacities[:, np.newaxis]).real
+    rates = np.linalg.eigvals(couplings / capacities[:, np.newaxis]).real
     return float(1.0 / rates.min()) if rates.min() > 0.0 else np.inf
 
 

@@ -173,9 +173,9 @@ def cage_verdict(trials: Sequence[Trial], limits: Thresholds, reason: str | None
 def _apart(classes: Sequence[CageClass], values: Array) -> bool:
     """Whether a measure of two classes of two replicates at least is so far apart that no single regime scatters over their limit."""
     (first, most), (second, fewer) = Counter(classes).most_common(2)
-    one, other = (values[[name == place for place in classes]] for name in (first, second))
-    scatter = math.hypot(one.std(), other.std())
-    return min(most, fewer) > 1 and abs(float(one.mean() - other.mean())) > TWO_REGIMES * scatter
+    values_a, values_b = (values[[name == place for place in classes]] for name in (first, second))
+    scatter = math.hypot(values_a.std(), values_b.std())
+    return min(most, fewer) > 1 and abs(float(values_a.mean() - values_b.mean())) > TWO_REGIMES * scatter
 
 
 def _error(values: Array) -> float | None:
@@ -186,10 +186,10 @@ def _error(values: Array) -> float | None:
 def _distances(series: Mapping[str, Array], limits: Thresholds, forcing: Sequence[Forcing]) -> dict[str, float]:
     """Distance of the mean of each measure to its thresholds over its standard error; none of a measure that does not scatter."""
     radius, rate = series["radius"], series["rate"]
-    fastest = np.array([max(limits.highest_rate, one.film_rate) for one in forcing])
+    fastest = np.array([max(limits.highest_rate, force.film_rate) for force in forcing])
     apart = [
-        [abs(own - order) - limits.forced_band * abs(order) for order in one.orders]
-        for own, one in zip(rate, forcing, strict=True)
+        [abs(frequency - order) - limits.forced_band * abs(order) for order in force.orders]
+        for frequency, force in zip(rate, forcing, strict=True)
     ]
     above = {
         "still_radius": radius - limits.still_radius,

@@ -131,7 +131,7 @@ def test_invariant_pressure_carries_the_load(difference, total, load):
     assert twice.stiffness == pytest.approx(contact.stiffness / math.sqrt(2.0), rel=1e-13)
     again = hertz.ellipse(math.log(contact.ellipticity))
     assert again.curvature_difference == pytest.approx(difference, rel=1e-10, abs=1e-14)
-    assert again.curvature_difference + again.curvature_rest == pytest.approx(1.0, abs=1e-14)
+    assert again.curvature_difference + again.curvature_complement == pytest.approx(1.0, abs=1e-14)
 
 
 def test_limit_circle_is_reached_smoothly():

@@ -187,7 +187,7 @@ def test_an_unseen_offset_is_that_of_the_dense_algebra() -> None:
     means, doubt = cells.mean(special.ndtr(steps)), cells.predict(special.ndtr(centre[None]))[1][0]
     slopes, ones = (means[:INPUTS] - means[INPUTS:]).T, np.repeat([1.0, 0.0], ROWS)
     other = np.outer(1.0 - ones, 1.0 - ones) * (0.02**2 + 0.05**2)
-    whole = np.diag(RIG**2 + cells.rest + (BY_ROW * 0.02) ** 2) + doubt @ doubt.T + slopes @ slopes.T + other
+    whole = np.diag(RIG**2 + cells.left_out + (BY_ROW * 0.02) ** 2) + doubt @ doubt.T + slopes @ slopes.T + other
     variance = 1.0 / (ones @ np.linalg.solve(whole, ones))
     moved = slopes.T @ np.linalg.solve(whole + np.outer(ones, ones) * (0.02**2 + 0.05**2), ones) * first.offset
     assert first.moves == pytest.approx(moved, rel=1e-8)
@@ -245,7 +245,7 @@ def test_components_foretell_all_cells_within_their_doubt() -> None:
     assert mean == pytest.approx(cells.mean(fresh), abs=1e-10)
     off = mean - _truth(fresh)
     assert np.sqrt((off**2).mean()) < 0.01
-    assert (off**2 / ((doubt**2).sum(axis=2) + cells.rest)).mean() < 2.0
+    assert (off**2 / ((doubt**2).sum(axis=2) + cells.left_out)).mean() < 2.0
 
 
 def test_errors_of_the_simulation_are_half_normal_of_three_kinds() -> None:

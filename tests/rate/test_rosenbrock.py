@@ -33,12 +33,12 @@ STEEPER = ("traction.constants=[-0.05,20.0,400.0,0.05]",)
 
 def dense(matrix):
     """An arrow matrix as a plain one, in the order of the state vector."""
-    z, m = matrix.own.shape[2], matrix.bodies.shape[0]
+    z, m = matrix.blocks.shape[2], matrix.bodies.shape[0]
     body = ROLLER_STATES * z
     full = np.zeros((body + m, body + m))
     for j in range(z):
         place = j + z * np.arange(ROLLER_STATES)
-        full[np.ix_(place, place)] = matrix.own[:, :, j]
+        full[np.ix_(place, place)] = matrix.blocks[:, :, j]
         full[place, body:] = matrix.upper[:, j, :]
         full[np.ix_(body + matrix.pushed, place)] = matrix.lower[:, :, j]
     full[body:, body:] = matrix.bodies
@@ -52,7 +52,7 @@ def test_unit_arrow_matrix(supported, interpreted):
     draw = np.random.default_rng(3)
     state = layout(7, supported, True)
     matrix, factors = arrow_matrix(state), arrow_matrix(state)
-    for block in (matrix.own, matrix.upper, matrix.lower, matrix.bodies):
+    for block in (matrix.blocks, matrix.upper, matrix.lower, matrix.bodies):
         block[:] = draw.normal(size=block.shape)
     right_side = draw.normal(size=state.size)
     steps = (shifted, factor, solve)
@@ -298,9 +298,9 @@ def test_unit_workspace_fits_every_layout(everything):
     """Unit: the bearing of one roller has the types of the whole one, so that no law is compiled twice."""
     bearing = roller_bearing(everything)
     work = rodas(layout_of(everything), bearing, increments(everything, bearing))
-    single = work.differences.one.bearing
+    single = work.differences.roller.bearing
     assert [type(part) for part in single] == [type(part) for part in bearing]
-    assert work.differences.one.y.size == layout_of(everything).size - ROLLER_STATES * (bearing.rollers - 1)
+    assert work.differences.roller.y.size == layout_of(everything).size - ROLLER_STATES * (bearing.rollers - 1)
 
 
 @pytest.mark.slow
@@ -315,7 +315,7 @@ def test_oracle_statistics_of_both_methods(make_scene):
         runs = [run_replicate(scene, bearing, index, 1e-2, Stop()) for index in range(16)]
         figures[method] = np.array(
             [
-                [statistic.of(run) for statistic in (IMPACT_FORCE, WHIRL_DEVIATION_RATIO, POWER_LOSS, CAGE_SLIP)]
+                [statistic.value(run) for statistic in (IMPACT_FORCE, WHIRL_DEVIATION_RATIO, POWER_LOSS, CAGE_SLIP)]
                 for run in runs
             ]
         )

@@ -146,11 +146,11 @@ def test_a_simulated_orbit_read_back_as_a_signal_is_the_statistic_of_the_run(tmp
     value, sd, _ = whirl(path, 800.0, (), None)
     # Batches of the run end at samples, so both integrate the same steps; the run has one sample more.
     assert kept.whirl[:, 0].sum() == 2801 == len(motion.time) + 1
-    assert value == pytest.approx(WHIRL_DEVIATION_RATIO.of(kept), rel=5e-3)
+    assert value == pytest.approx(WHIRL_DEVIATION_RATIO.value(kept), rel=5e-3)
     # The filter matters more than the error.
-    assert abs(value - WHIRL_DEVIATION_RATIO.of(_counted(plain))) > 5.0 * sd
+    assert abs(value - WHIRL_DEVIATION_RATIO.value(_counted(plain))) > 5.0 * sd
     notched = _counted(filtered.changed({"numerics.whirl_notches_hz": [400.0]}))
-    assert WHIRL_DEVIATION_RATIO.of(notched) == pytest.approx(whirl(path, 800.0, (400.0,), None)[0], rel=0.02)
+    assert WHIRL_DEVIATION_RATIO.value(notched) == pytest.approx(whirl(path, 800.0, (400.0,), None)[0], rel=0.02)
     assert (notched.work == kept.work).all()
 
 

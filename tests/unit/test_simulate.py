@@ -312,16 +312,16 @@ def record_of(speeds, scene, **changes):
 def test_literature_whirl_deviation_ratio(outer):
     """Literature: 0 for steady circular whirl, 0.523 for an isotropic Gaussian velocity, 0 for a cage at rest."""
     # The sum of squares loses half the digits.
-    assert WHIRL_DEVIATION_RATIO.of(record_of(np.full(1000, 0.3), outer)) == pytest.approx(0.0, abs=1e-7)
+    assert WHIRL_DEVIATION_RATIO.value(record_of(np.full(1000, 0.3), outer)) == pytest.approx(0.0, abs=1e-7)
     velocity = np.random.default_rng(0).normal(size=(2, 400_000))
     # Standard error of the ratio of 400000 samples: 6e-4.
-    ratio = WHIRL_DEVIATION_RATIO.of(record_of(np.hypot(*velocity), outer))
+    ratio = WHIRL_DEVIATION_RATIO.value(record_of(np.hypot(*velocity), outer))
     assert ratio == pytest.approx(math.sqrt(4.0 / math.pi - 1.0), abs=3e-3)
     assert ratio == pytest.approx(0.523, abs=3e-3)
-    assert WHIRL_DEVIATION_RATIO.of(record_of(np.zeros(10), outer)) == 0.0
+    assert WHIRL_DEVIATION_RATIO.value(record_of(np.zeros(10), outer)) == 0.0
     speeds = np.random.default_rng(1).uniform(0.1, 0.9, 50)
     expected = speeds.std(ddof=1) / speeds.mean()
-    assert WHIRL_DEVIATION_RATIO.of(record_of(speeds, outer)) == pytest.approx(expected, rel=1e-12)
+    assert WHIRL_DEVIATION_RATIO.value(record_of(speeds, outer)) == pytest.approx(expected, rel=1e-12)
 
 
 def test_unit_replicate_figures(outer):
@@ -341,13 +341,13 @@ def test_unit_replicate_figures(outer):
         cage_angle=np.full(2, 0.5 * outer.geometry.motion.cage_speed),
         kinematic_angle=np.full(2, outer.geometry.motion.cage_speed),
     )
-    assert (IMPACT_FORCE.of(run), POWER_LOSS.of(run)) == (15.0, 2.0)
+    assert (IMPACT_FORCE.value(run), POWER_LOSS.value(run)) == (15.0, 2.0)
     assert list(run.windows(POCKET_CONTACT_LOAD)) == [8.0, 3.0] and list(run.windows(POCKET_LOAD)) == [10.0, 20.0]
     assert run.power("outer_race_traction") == 1.5
     assert run.power_gap == pytest.approx(0.02)
-    assert CAGE_SLIP.of(run) == pytest.approx(0.5)
+    assert CAGE_SLIP.value(run) == pytest.approx(0.5)
     later = run.counted_from(1)
-    assert (IMPACT_FORCE.of(later), later.duration) == (20.0, 1.0)
+    assert (IMPACT_FORCE.value(later), later.duration) == (20.0, 1.0)
     assert later.missing_work == pytest.approx(2.5 - 2.0 + 4.1)
 
 

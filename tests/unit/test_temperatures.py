@@ -483,8 +483,10 @@ def test_unit_the_heat_of_the_steady_state_is_exact_where_it_is_linear(hot):
     network = network_of(simulated_scene(hot), balance.thermal, bearing)
     nodes, powers = np.array([90.0, 92.0, 95.0, 99.0]), np.full(network.weights.shape[1], 20.0)
     model = heat_model(simulated_scene(hot), network, nodes, powers, balance.viscosity)
-    rest = np.array([[-0.4, 0.1, 0.0, -0.2], [0.2, -0.6, 0.3, 0.0], [0.1, 0.2, -0.5, -0.1], [0.0, -0.3, 0.2, -0.2]])
-    linear = model._replace(losses=model.losses._replace(exponents=np.zeros_like(model.losses.exponents)), rest=rest)
+    residue = np.array([[-0.4, 0.1, 0.0, -0.2], [0.2, -0.6, 0.3, 0.0], [0.1, 0.2, -0.5, -0.1], [0.0, -0.3, 0.2, -0.2]])
+    linear = model._replace(
+        losses=model.losses._replace(exponents=np.zeros_like(model.losses.exponents)), residue=residue
+    )
     slopes = linear.image_slopes(nodes)
     state = State(nodes, nodes + np.linalg.solve(linear.matrix, linear.excess(nodes)), np.zeros(4), linear)
     steady = linear.balanced()

@@ -8,7 +8,7 @@ import pytest
 from rbdyn.base.faults import InputError
 from rbdyn.properties.materials import oil_at
 from rbdyn.thermal.fixed_point import MOST_STATES, State, learned, model_of, next_step, steady_state
-from rbdyn.thermal.losses import HeatModel, Losses, film_powers, gain, log_viscosity, no_rest
+from rbdyn.thermal.losses import HeatModel, Losses, film_powers, gain, log_viscosity, no_residue
 from rbdyn.thermal.network import Boundaries, Conductances, carried_off, matrix, source, temperatures
 
 USUAL = Conductances(30.0, 8.0, 5.0, 12.0, 18.0, 11.0, 7.0, 4.0)
@@ -23,7 +23,7 @@ VISCOSITY = log_viscosity(lambda degrees: oil_at("MIL-L-7808", degrees))
 def _model(state, powers, exponent=0.0, network=USUAL, boundaries=BOUNDARIES):
     """Model of a balance whose nodes each have one loss, with the viscosity at their own temperature."""
     losses = Losses(np.asarray(state), np.asarray(powers), np.full(4, exponent), np.eye(4), VISCOSITY)
-    return HeatModel(losses, np.eye(4), network, boundaries, no_rest())
+    return HeatModel(losses, np.eye(4), network, boundaries, no_residue())
 
 
 def _state(state, heat, noise=0.0, network=USUAL, boundaries=BOUNDARIES):
@@ -85,7 +85,7 @@ def test_unit_linear_heat_needs_one_step_with_its_slopes():
     balance, calls = _balance(lambda state: HEAT + heat_slopes @ (state - COLD))
 
     def model(states):
-        return states[-1].model._replace(rest=heat_slopes)
+        return states[-1].model._replace(residue=heat_slopes)
 
     search = steady_state(balance, COLD + 25.0, COLD, _as_estimated, model, tolerance=1e-9)
     assert search.status == "steady" and len(calls) == 2
@@ -178,7 +178,7 @@ def test_unit_steps_are_bounded_and_turn_back_by_half():
     assert np.abs(onward).max() == pytest.approx(40.0) and onward.min() > 0.0
     back = next_step(state.model, state, np.full(4, -10.0))
     assert np.abs(back).max() == pytest.approx(5.0) and back == pytest.approx(onward / 8.0)
-    unstable = state.model._replace(rest=3.0 * matrix(USUAL))
+    unstable = state.model._replace(residue=3.0 * matrix(USUAL))
     assert next_step(unstable, state, None) == pytest.approx(onward)
 
 
@@ -232,4 +232,4 @@ def test_unit_states_teach_exponents_and_what_else_moves_heat():
     assert film_powers(warm.losses._replace(powers=HEAT), seen, 0.2, 0.01) == pytest.approx(np.full(4, 0.4))
     assert film_powers(warm.losses._replace(powers=HEAT), seen, 5.0, 0.01) == pytest.approx(np.full(4, 0.7))
     states = [_state(np.full(4, 60.0), HEAT), _state(np.full(4, 80.0), HEAT + 100.0)]
-    assert model_of(states).rest @ np.ones(4) == pytest.approx(np.full(4, 5.0))
+    assert model_of(states).residue @ np.ones(4) == pytest.approx(np.full(4, 5.0))

@@ -139,16 +139,16 @@ def good_news(summary: Summary) -> str:
     if not real:
         return "No response improves by more than its error."
     words = " and ".join(quantity(name)[0] for name in real) if len(real) < 3 else f"{len(real)} responses"
-    whole = (
+    subject = (
         f"All {count} responses improve"
         if len(real) == count > 1
         else f"{words[:1].upper()}{words[1:]} improve{'s' * (len(real) == 1)}"
     )
-    rest = "" if len(real) == count else f", of {counted(count, 'response')}"
-    kept = (
+    extent = "" if len(real) == count else f", of {counted(count, 'response')}"
+    limits = (
         " and every limit is met" if summary.limits and not (summary.obstacles.limits or summary.obstacles.cage) else ""
     )
-    return f"{whole}{rest}{kept}."
+    return f"{subject}{extent}{limits}."
 
 
 def _role_of_gains(gains: Mapping[str, Gain], text: str) -> Role:
@@ -505,14 +505,14 @@ def motion(summary: Summary, motion: Mapping[str, DrawnMotion]) -> Section | Non
         return None
     path = "Path of the cage centre about the guide centre, and enlarged; triangle: start, square: end."
     caption = f"{path} The radius of the dashed circle is half of the diametral guide clearance."
-    pictures = [orbit(name, run, whole).svg for whole in (True, False) for name, run in motion.items()]
+    pictures = [orbit(name, run, guided).svg for guided in (True, False) for name, run in motion.items()]
     return Section("motion", "Motion of the bearing", [Figures(pictures, caption), Widget("bearing")])
 
 
-def orbit(name: str, motion: DrawnMotion, whole: bool) -> Still:
+def orbit(name: str, motion: DrawnMotion, guided: bool) -> Still:
     """Cage centre along and across the load: in the whole guide clearance, or enlarged."""
-    title = f"{name}{'' if whole else ', enlarged'}"
-    radius = motion.guide_radius_um if whole else None
+    title = f"{name}{'' if guided else ', enlarged'}"
+    radius = motion.guide_radius_um if guided else None
     return Still(f"Cage orbit at the {title}", partial(_orbit, title, *motion.orbit_um, radius), height=326.0)
 
 

@@ -333,19 +333,19 @@ def draw_compared(cells: Sequence[Cell], path: Path) -> None:
     figure, axes = plt.subplots(1, len(outputs), figsize=(4.2 * len(outputs), 3.6), squeeze=False)
     for axis, name in zip(axes[0], outputs, strict=True):
         plain(axis)
-        own = [cell for cell in cells if cell.output == name]
-        rows, measured = [cell.row for cell in own], np.array([cell.measured for cell in own])
-        predictions = {"before": [cell.before for cell in own], "after": [cell.after for cell in own if cell.after]}
+        data = [cell for cell in cells if cell.output == name]
+        rows, measured = [cell.row for cell in data], np.array([cell.measured for cell in data])
+        predictions = {"before": [cell.before for cell in data], "after": [cell.after for cell in data if cell.after]}
         for key, colour, width in (("before", GREY, 9.0), ("after", BLUE, 5.0)):
             if predictions[key]:
                 low, middle, high = 100.0 * (np.array(predictions[key]).T / measured - 1.0)
                 words = f"simulated, 5 to 95 % of the inputs {key}"
                 axis.vlines(rows, low, high, color=colour, linewidth=width, alpha=0.35, label=words)
                 axis.plot(rows, middle, "_", color=colour, markersize=8)
-        nominal = np.array([cell.as_the_scene_says for cell in own])
+        nominal = np.array([cell.as_the_scene_says for cell in data])
         axis.plot(rows, 100.0 * (nominal / measured - 1.0), "x", color=ORANGE, markersize=4, label="scene values")
         for in_trial, mark, words in ((False, "o", "measured, 95 %"), (True, "s", "measured and held out")):
-            errors = {cell.row: 100.0 * NORMAL * cell.sd / cell.measured for cell in own if cell.held is in_trial}
+            errors = {cell.row: 100.0 * NORMAL * cell.sd / cell.measured for cell in data if cell.held is in_trial}
             if errors:
                 axis.errorbar([*errors], [0.0] * len(errors), yerr=[*errors.values()], fmt=mark, color=VERMILION,
                               markersize=3.5, label=words)  # fmt: skip

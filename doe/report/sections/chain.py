@@ -51,8 +51,8 @@ def chains(summary: Summary, motion: Mapping[str, Any]) -> Section:
         caption = "Contribution of each part to the scatter of the closing link."
         blocks += [Heading(label(name)), Figures([contributions(name, chain.contributions).svg], caption)]
         blocks += chain_blocks(name, chain)
-        rest = {"normal_yield": chain.normal_yield, "seed": chain.seed}
-        blocks.append(record_table(f"Further results of the chain {label(name)}", rest, folded=True))
+        results = {"normal_yield": chain.normal_yield, "seed": chain.seed}
+        blocks.append(record_table(f"Further results of the chain {label(name)}", results, folded=True))
     return Section("chains", "Dimension chains", blocks)
 
 

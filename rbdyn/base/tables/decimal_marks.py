@@ -102,8 +102,8 @@ def is_like_number(text: str) -> bool:
 
 def _shown(text: str) -> tuple[str | None, str]:
     """The decimal mark that a number shows, None without one, and its thousands separator; of any other text nothing."""
-    if one := WITH_MARK.fullmatch(text):
-        return one[1] or one[2], ""
+    if match := WITH_MARK.fullmatch(text):
+        return match[1] or match[2], ""
     if grouped := GROUPED.fullmatch(text):
         group, decimal = grouped["group"], grouped["decimal"]
         if group == decimal:

@@ -49,12 +49,12 @@ class Limits(NamedTuple):
     most: float
     least: float = 0.0
     sign: Literal["any", "not negative", "positive"] = "any"
-    whole: bool = False
+    integer: bool = False
 
     def fault(self, value: float) -> str:
         """The fault of a value outside the limits, with its fix."""
-        if not math.isfinite(value) or (self.whole and value != round(value)):
-            return f"is not a {'whole' if self.whole else 'finite'} number; write a plain one"
+        if not math.isfinite(value) or (self.integer and value != round(value)):
+            return f"is not a {'whole' if self.integer else 'finite'} number; write a plain one"
         if abs(value) > self.most:
             return f"is beyond {self.most:g}; check the unit"
         if value < 0.0 and self.sign == "not negative":
@@ -71,7 +71,7 @@ class Limits(NamedTuple):
         """Places of the values (n,) outside the limits."""
         size = np.abs(values)
         valid = (size <= self.most) & ((size >= self.least) | (size == 0.0))
-        valid &= (values == np.round(values)) | (not self.whole)
+        valid &= (values == np.round(values)) | (not self.integer)
         valid &= (values > 0.0) | ((values == 0.0) & (self.sign != "positive")) | (self.sign == "any")
         return np.flatnonzero(~valid).tolist()
 

@@ -188,11 +188,11 @@ def read_workbook(path: Path, data: bytes, sheet: str | None) -> SheetCells:
         raise InputError([f"{path}: is not an Excel workbook; give a table of text a name that ends in .csv"])
     parts = Parts(path, data)
     book = _book(parts)
-    listed = ", ".join(one_line(one.name, LONGEST_NAME) for one in book.sheets[:20])
+    listed = ", ".join(one_line(item.name, LONGEST_NAME) for item in book.sheets[:20])
     if not book.sheets:
         raise InputError([f"{path}: has no sheet with cells; save the table in one"])
-    visible = [one for one in book.sheets if one.visible] or book.sheets
-    named = (one for one in book.sheets if sheet is not None and one.name.lower() == sheet.lower())
+    visible = [candidate for candidate in book.sheets if candidate.visible] or book.sheets
+    named = (candidate for candidate in book.sheets if sheet is not None and candidate.name.lower() == sheet.lower())
     found = visible[0] if sheet is None else next(named, None)
     if found is None:
         raise InputError([f"{path}: has no sheet {one_line(sheet or '', LONGEST_NAME)!r}; name one of {listed}"])
@@ -251,7 +251,7 @@ def _book(parts: Parts) -> _Book:
         parts.parse(names["sharedStrings"], shared.start, shared.end, shared.text)
     kinds = _kinds(parts, names["styles"]) if "styles" in names else []
     epoch = datetime(1904, 1, 1) if "date1904" in switches else datetime(1899, 12, 30)
-    return _Book(sheets, kinds, shared.whole, epoch, "fullCalcOnLoad" in switches)
+    return _Book(sheets, kinds, shared.texts, epoch, "fullCalcOnLoad" in switches)
 
 
 def _kinds(parts: Parts, name: str) -> list[str]:
@@ -290,12 +290,12 @@ def _kind(number: str, code: str | None) -> str:
 
 
 class _Texts:
-    """Texts that cells share, in ``whole``, as their part is parsed."""
+    """Texts that cells share, in ``texts``, as their part is parsed."""
 
     tag = "si"
 
     def __init__(self, parts: Parts) -> None:
-        self.parts, self.whole = parts, list[str]()
+        self.parts, self.texts = parts, list[str]()
         self._pieces, self._length, self._open, self._spoken = list[str](), 0, False, False
 
     def start(self, tag: str, keys: Mapping[str, str]) -> None:
@@ -327,8 +327,8 @@ class _Texts:
 
     def keep(self, text: str) -> None:
         """Take up a whole text."""
-        self.whole.append(text)
-        if len(self.whole) > MOST_CELLS:
+        self.texts.append(text)
+        if len(self.texts) > MOST_CELLS:
             raise self.parts.too_large(f"has more than {MOST_CELLS} texts")
 
 

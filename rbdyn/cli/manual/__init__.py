@@ -38,8 +38,8 @@ def manual(
         from rbdyn.scene.keys import Part
 
         folder.claim()
-        own = Part("rbdyn", Path(__file__).with_name("prose"), context.find_root().command, kinds(), drawings, tables)
-        text = page([own, *(entry.load()() for entry in sorted(entry_points(group=GROUP)))])
+        part = Part("rbdyn", Path(__file__).with_name("prose"), context.find_root().command, kinds(), drawings, tables)
+        text = page([part, *(entry.load()() for entry in sorted(entry_points(group=GROUP)))])
         folder.write(lambda stage: (stage / PAGE).write_text(text, encoding="utf-8"))
         hand_over(lambda: {"status": "ok", "page": str(out / PAGE)}, as_json, lambda: None, out, [PAGE])
 

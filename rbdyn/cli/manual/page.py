@@ -65,9 +65,9 @@ def equations(trees: Trees, package: str) -> Iterator[str]:
     for name, tree in _within(trees, package):
         nodes = (node for node in ast.walk(tree) if isinstance(node, Named))
         sources = [node for node in nodes if EQUATION.search(ast.get_docstring(node) or "")]
-        whole = ast.get_docstring(tree) or ""
-        if sources or EQUATION.search(whole):
-            yield f"### `{name}`\n\n{markdown(whole)}"
+        docstring = ast.get_docstring(tree) or ""
+        if sources or EQUATION.search(docstring):
+            yield f"### `{name}`\n\n{markdown(docstring)}"
             for node in sorted(sources, key=lambda node: node.lineno):
                 yield f"#### `{node.name}`\n\n{_signature(node, trees[name].lines)}{_text(node)}"
 
@@ -108,8 +108,8 @@ def _handed_on(tree: ast.Module, package: str) -> list[str]:
             return list(ast.literal_eval(node.value))
     if not all(isinstance(node, ast.ImportFrom | ast.Expr) for node in tree.body):
         return []
-    own = (node for node in tree.body if isinstance(node, ast.ImportFrom) and str(node.module).startswith(package))
-    return [alias.name for node in own for alias in node.names]
+    imports = (node for node in tree.body if isinstance(node, ast.ImportFrom) and str(node.module).startswith(package))
+    return [alias.name for node in imports for alias in node.names]
 
 
 def _home(trees: Trees, module: str, name: str) -> tuple[str, Named] | None:
@@ -297,12 +297,12 @@ def keys_of(part: Part) -> Iterator[str]:
 def commands_of(part: Part) -> Iterator[str]:
     """A heading for each command: its usage, purpose and options."""
     for name, command in part.commands.commands.items():
-        whole = f"{part.package} {name}"
-        context = typer.Context(command, info_name=whole)
+        title = f"{part.package} {name}"
+        context = typer.Context(command, info_name=title)
         usage = " ".join(command.get_usage(context).removeprefix("Usage: ").split())
         records = filter(None, (parameter.get_help_record(context) for parameter in command.params))
         options = "\n".join(f"- `{option}`: {plain(says)}" for option, says in records)
-        yield f"## `{whole}`\n\n```sh\n{usage}\n```\n\n{plain(command.help)}\n\n{options}"
+        yield f"## `{title}`\n\n```sh\n{usage}\n```\n\n{plain(command.help)}\n\n{options}"
 
 
 def plain(text: str) -> str:

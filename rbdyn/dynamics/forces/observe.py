@@ -34,7 +34,7 @@ def spread(contact, largest_overlap, loads, nx, ny, slices):
                 high = middle
         for k in range(slices.shape[1]):
             overlap = high - slice_drop(contact, k, nx[i], ny[i])
-            slices[i, k] = contact.share[k] * closed_load(contact.whole, overlap)[0]
+            slices[i, k] = contact.share[k] * closed_load(contact.line, overlap)[0]
 
 
 def slice_loads(

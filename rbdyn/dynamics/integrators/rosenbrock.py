@@ -16,8 +16,8 @@ difference. One Jacobian costs 5 z right-hand sides of one roller and one full r
 
 It is an arrow matrix: each roller couples to itself and to the bodies, not to the other rollers.
 
-    | own_1             upper_1 |      own_j:   5 x 5, a roller's coordinates among themselves
-    |         own_2     upper_2 |      upper_j: 5 x m, effect of the bodies on roller j
+    | block_1           upper_1 |      block_j: 5 x 5, a roller's coordinates among themselves
+    |         block_2   upper_2 |      upper_j: 5 x m, effect of the bodies on roller j
     | lower_1 lower_2 .. bodies |      lower_j: m x 5, effect of roller j on the bodies
 
 Elimination takes the rollers first and leaves an m x m system for the bodies (Golub and Van Loan, Matrix Computations,
@@ -43,7 +43,7 @@ from rbdyn.losses import POWERS
 class ArrowMatrix(NamedTuple):
     """Blocks of the matrix; after ``factor`` those of its factors. Arrays, changed in place."""
 
-    own: NDArray[np.float64]  # (5, 5, z)
+    blocks: NDArray[np.float64]  # (5, 5, z)
     upper: NDArray[np.float64]  # (5, z, m)
     lower: NDArray[np.float64]  # (rows that rollers push, 5, z)
     bodies: NDArray[np.float64]  # (m, m)
@@ -56,7 +56,7 @@ def arrow_matrix(layout: Layout) -> ArrowMatrix:
     z, m = layout.rollers, len(layout.bodies)
     pushed = [place for place, part in enumerate(layout.bodies) if part.pushed]
     return ArrowMatrix(
-        own=np.zeros((ROLLER_STATES, ROLLER_STATES, z)),
+        blocks=np.zeros((ROLLER_STATES, ROLLER_STATES, z)),
         upper=np.zeros((ROLLER_STATES, z, m)),
         lower=np.zeros((len(pushed), ROLLER_STATES, z)),
         bodies=np.zeros((m, m)),
@@ -68,12 +68,12 @@ def arrow_matrix(layout: Layout) -> ArrowMatrix:
 @routine
 def shifted(matrix, shift, result):
     """``shift`` I - ``matrix`` into ``result``."""
-    z, m = matrix.own.shape[2], matrix.bodies.shape[0]
+    z, m = matrix.blocks.shape[2], matrix.bodies.shape[0]
     for r in range(ROLLER_STATES):
         for c in range(ROLLER_STATES):
             diagonal = shift if r == c else 0.0
             for j in range(z):
-                result.own[r, c, j] = diagonal - matrix.own[r, c, j]
+                result.blocks[r, c, j] = diagonal - matrix.blocks[r, c, j]
         for j in range(z):
             for b in range(m):
                 result.upper[r, j, b] = -matrix.upper[r, j, b]
@@ -93,29 +93,29 @@ def factor(matrix):
     Rollers without exchange of rows: positions come first, and eliminating them leaves inertia, damping and stiffness of
     the velocities, whose pivots are sound where a step is. A zero pivot shows as values that are not finite.
     """
-    own, upper = matrix.own, matrix.upper
-    z, m = own.shape[2], matrix.bodies.shape[0]
+    blocks, upper = matrix.blocks, matrix.upper
+    z, m = blocks.shape[2], matrix.bodies.shape[0]
     for p in range(ROLLER_STATES):
         for j in range(z):
-            own[p, p, j] = 1.0 / own[p, p, j]
+            blocks[p, p, j] = 1.0 / blocks[p, p, j]
         for r in range(p + 1, ROLLER_STATES):
             for j in range(z):
-                own[r, p, j] *= own[p, p, j]
+                blocks[r, p, j] *= blocks[p, p, j]
             for c in range(p + 1, ROLLER_STATES):
                 for j in range(z):
-                    own[r, c, j] -= own[r, p, j] * own[p, c, j]
+                    blocks[r, c, j] -= blocks[r, p, j] * blocks[p, c, j]
             for j in range(z):
-                multiplier = own[r, p, j]
+                multiplier = blocks[r, p, j]
                 for b in range(m):
                     upper[r, j, b] -= multiplier * upper[p, j, b]
     for r in range(ROLLER_STATES - 1, -1, -1):
         for j in range(z):
             for c in range(r + 1, ROLLER_STATES):
-                multiplier = own[r, c, j]
+                multiplier = blocks[r, c, j]
                 for b in range(m):
                     upper[r, j, b] -= multiplier * upper[c, j, b]
             for b in range(m):
-                upper[r, j, b] *= own[r, r, j]
+                upper[r, j, b] *= blocks[r, r, j]
     for a in range(matrix.pushed.size):
         row = matrix.pushed[a]
         for c in range(ROLLER_STATES):
@@ -149,19 +149,19 @@ def factor_dense(a, pivots):
 @routine
 def solve(factors, x):
     """Replace the right side ``x``, in the order of the state vector, by the solution."""
-    own, upper, pivots = factors.own, factors.upper, factors.pivots
-    z, m = own.shape[2], factors.bodies.shape[0]
+    blocks, upper, pivots = factors.blocks, factors.upper, factors.pivots
+    z, m = blocks.shape[2], factors.bodies.shape[0]
     body = ROLLER_STATES * z
     for r in range(ROLLER_STATES):
         for c in range(r):
             for j in range(z):
-                x[r * z + j] -= own[r, c, j] * x[c * z + j]
+                x[r * z + j] -= blocks[r, c, j] * x[c * z + j]
     for r in range(ROLLER_STATES - 1, -1, -1):
         for c in range(r + 1, ROLLER_STATES):
             for j in range(z):
-                x[r * z + j] -= own[r, c, j] * x[c * z + j]
+                x[r * z + j] -= blocks[r, c, j] * x[c * z + j]
         for j in range(z):
-            x[r * z + j] *= own[r, r, j]
+            x[r * z + j] *= blocks[r, r, j]
     for a in range(factors.pushed.size):
         total = 0.0
         for c in range(ROLLER_STATES):
@@ -204,22 +204,22 @@ class Differences(NamedTuple):
     matrix: ArrowMatrix
     power: NDArray[np.float64]  # (POWERS, n)
     increments: NDArray[np.float64]
-    one: OneRoller
+    roller: OneRoller
 
 
 @law
-def take_size(sizes, one, j):
-    """Give the bearing ``one`` the size of roller ``j``."""
+def take_size(sizes, roller, j):
+    """Give the bearing ``roller`` the size of roller ``j``."""
 
 
 @take_size.body(EqualRollers)
-def _(sizes, one, j):
+def _(sizes, roller, j):
     pass
 
 
 @take_size.body(UnequalRollers)
-def _(sizes, one, j):
-    one.sizes.radii[:] = sizes.radii[j]
+def _(sizes, roller, j):
+    roller.sizes.radii[:] = sizes.radii[j]
 
 
 @routine
@@ -241,33 +241,33 @@ def jacobian(bearing, y, stage, k, row, power, loads, scratch, differences):
             differences.matrix.bodies[a, b] = (k[row, body + a] - k[0, body + a]) * per
         for p in range(POWERS):
             differences.power[p, body + b] = (power[row, p] - power[0, p]) * per
-    one = differences.one
-    single = one.bearing
+    roller = differences.roller
+    single = roller.bearing
     for b in range(m):
-        one.y[ROLLER_STATES + b] = y[body + b]
+        roller.y[ROLLER_STATES + b] = y[body + b]
     for j in range(z):
         single.pocket_cos[0], single.pocket_sin[0] = bearing.pocket_cos[j], bearing.pocket_sin[j]
         take_size(bearing.sizes, single, j)
         for c in range(ROLLER_STATES):
-            one.y[c] = y[c * z + j]
+            roller.y[c] = y[c * z + j]
         # Column ROLLER_STATES stands for the roller unchanged, from which the others differ: one call, compiled once.
         for c in range(ROLLER_STATES, -1, -1):
             place = c * z + j
             if c < ROLLER_STATES:
-                one.y[c] = y[place] + differences.increments[place]
-            derivative(single, one.y, c // ROLLER_STATES, one.dy, one.power, one.loads, one.scratch)
+                roller.y[c] = y[place] + differences.increments[place]
+            derivative(single, roller.y, c // ROLLER_STATES, roller.dy, roller.power, roller.loads, roller.scratch)
             if c < ROLLER_STATES:
-                per = 1.0 / (one.y[c] - y[place])
-                one.y[c] = y[place]
+                per = 1.0 / (roller.y[c] - y[place])
+                roller.y[c] = y[place]
                 roller_column(differences, c, j, z, per)
 
 
 @kernel
 def roller_column(differences, c, j, z, per):
     """Column ``c`` of roller ``j`` from the right-hand sides of its bearing: row 1 unchanged, row 0 changed."""
-    matrix, dy, power = differences.matrix, differences.one.dy, differences.one.power
+    matrix, dy, power = differences.matrix, differences.roller.dy, differences.roller.power
     for r in range(ROLLER_STATES):
-        matrix.own[r, c, j] = (dy[0, r] - dy[1, r]) * per
+        matrix.blocks[r, c, j] = (dy[0, r] - dy[1, r]) * per
     for a in range(matrix.pushed.size):
         row = ROLLER_STATES + matrix.pushed[a]
         matrix.lower[a, c, j] = (dy[0, row] - dy[1, row]) * per
@@ -404,8 +404,8 @@ def _(method, bearing, stage, k, power, loads, scratch, counts):
 
 @laws.interpolate.body(Rodas)
 def _(method, y, end, k, h, theta, i):
-    rest = 1.0 - theta
-    return y[i] * rest + theta * (end[i] + rest * (method.dense[0, i] + theta * method.dense[1, i]))
+    left = 1.0 - theta
+    return y[i] * left + theta * (end[i] + left * (method.dense[0, i] + theta * method.dense[1, i]))
 
 
 @laws.work_done.body(Rodas)

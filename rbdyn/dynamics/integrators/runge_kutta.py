@@ -329,14 +329,14 @@ def _(pair, k, h, inverse_tolerance):
     for i in range(n):
         e = rate_error(pair, k, i) * inverse_tolerance[i]
         k[squares, i] = e * e
-    whole = n // 4 * 4
+    vectors = n // 4 * 4
     sum_0 = sum_1 = sum_2 = sum_3 = 0.0
-    for i in range(0, whole, 4):
+    for i in range(0, vectors, 4):
         sum_0 += k[squares, i]
         sum_1 += k[squares, i + 1]
         sum_2 += k[squares, i + 2]
         sum_3 += k[squares, i + 3]
-    for i in range(whole, n):
+    for i in range(vectors, n):
         sum_0 += k[squares, i]
     return h * math.sqrt((sum_0 + sum_1) + (sum_2 + sum_3))
 
@@ -353,8 +353,8 @@ def _(pair, y, end, k, h, theta, i):
     slope = h * k[0, i] - difference
     curve = difference - h * k[pair.last, i] - slope
     quartic = h * quartic_rate(pair, k, i)
-    rest = 1.0 - theta
-    return y[i] + theta * (difference + rest * (slope + theta * (curve + rest * quartic)))
+    left = 1.0 - theta
+    return y[i] + theta * (difference + left * (slope + theta * (curve + left * quartic)))
 
 
 @laws.end_step.body(*PAIRS)

@@ -29,7 +29,7 @@ from rbdyn.thermal.conductances import (
     surfaces,
 )
 from rbdyn.thermal.heat import GUIDES, TERMS, Effusivities, shares
-from rbdyn.thermal.losses import HeatModel, Losses, no_rest
+from rbdyn.thermal.losses import HeatModel, Losses, no_residue
 from rbdyn.thermal.network import NODES, OIL, ROLLERS, Boundaries, Conductances, matrix, source
 from rbdyn.thermal.oil_fraction import fraction_notes, residence
 
@@ -104,7 +104,7 @@ def heat_model(hot: Scene, network: Network, temperatures: Array, powers: Array,
             films[row, node] += 0.5
     exponents = np.array([loss.exponent for loss in LOSSES])
     losses = Losses(temperatures, network.terms(powers), exponents, films, viscosity)
-    return HeatModel(losses, network.term_shares, network.conductances, network.boundaries, no_rest())
+    return HeatModel(losses, network.term_shares, network.conductances, network.boundaries, no_residue())
 
 
 def ring_width(scene: Scene) -> float:
@@ -166,7 +166,7 @@ def loss_levels(hot: Scene, bearing: RollerBearing) -> dict[str, Callable[[float
         return {}
     rolling = np.array([term.endswith("rolling_resistance") for term in TERMS])
     loads = load_distribution(hot, bearing, hot.operation.largest_load_N)
-    forces = np.log([_rolling_force(hot, loads, one) for one in DISTANCES])
+    forces = np.log([_rolling_force(hot, loads, ratio) for ratio in DISTANCES])
     usual = math.log(_rolling_force(hot, loads, distance))
 
     def at_distance(value: float) -> Array:

@@ -344,20 +344,20 @@ def race_contact_law(scene: Scene, which: str) -> Any:
     length, gamma = scene.bearing.effective_length, scene.bearing.diameter_ratio
     modulus = _modulus(scene, "roller", "rings")
     law = scene.model.line_contact
-    whole: Any = palmgren(modulus, length)
+    contact: Any = palmgren(modulus, length)
     if law == "iso16281":
-        whole = iso_16281(modulus, length)
+        contact = iso_16281(modulus, length)
     elif law == "houpert":
-        whole = houpert(modulus, length, scene.geometry.reduced_radii[("outer", "inner").index(which)])
+        contact = houpert(modulus, length, scene.geometry.reduced_radii[("outer", "inner").index(which)])
     elif law == "dowson_higginson":
-        whole = dowson_higginson(modulus, length, gamma if which == "outer" else -gamma)
+        contact = dowson_higginson(modulus, length, gamma if which == "outer" else -gamma)
     if scene.slices == 1:
-        return whole
+        return contact
     from rbdyn.contact.profile import slice_centres
 
     share = scene.bearing.inner_tilt_share if which == "inner" else 1.0 - scene.bearing.inner_tilt_share
     return slice_contact(
-        whole,
+        contact,
         roller_relief(scene, scene.slices),
         slice_centres(scene.slices, length),
         scene.bearing.tilt * share,

@@ -154,10 +154,10 @@ def absolute_tolerance(scene: Scene, bearing: RollerBearing, rtol: float, method
         slip = min(speed, scene.once("slip_scale", lambda: slip_scale(bearing, 5.0 * scale.load)))
     roller, cage = scene.geometry.roller_radius, 0.5 * scene.bearing.pitch_diameter
     sizes = {"m": length, "m/s": speed}
-    own = CAGE_SHARES[method] * speed
+    cage_speed = CAGE_SHARES[method] * speed
     sizes_of = {
         "roller": sizes | {"rad/s": slip / roller},
-        "cage": {"m": length, "rad": length / cage, "m/s": own, "rad/s": own / cage},
+        "cage": {"m": length, "rad": length / cage, "m/s": cage_speed, "rad/s": cage_speed / cage},
         "inner ring": sizes,
         "outer ring": sizes,
         "contact": {"1": COEFFICIENT_SCALE},

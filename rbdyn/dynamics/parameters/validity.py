@@ -41,9 +41,9 @@ def race_report(scene: Scene, inner_load: float, outer_load: float) -> dict[str,
     for name, load in (("inner", inner_load), ("outer", outer_load)):
         if load < SMALLEST_LOAD:
             continue
-        whole = contacts[name]
+        line = contacts[name]
         most = load if count == 1 else _most_loaded_slice(scene, name, load)
-        contact = whole._replace(length=whole.length / count)
+        contact = line._replace(length=line.length / count)
         report[name] = {
             "max_pressure_MPa": float(hertz_pressure(contact, most)) * 1e-6,
             "half_width_um": float(half_width(contact, most)) * 1e6,

@@ -80,11 +80,11 @@ def find_transient(series: Array) -> int | None:
     spread = np.maximum(np.cumsum(tails**2) - count * mean**2, 0.0) / count**2
     half = (groups + 1) // 2
     dropped = half - int(np.argmin(spread[::-1][: half + 1][::-1]))
-    head, rest = means[:dropped], means[dropped:]
+    start, tail = means[:dropped], means[dropped:]
     if dropped == 0:
         return 0
-    error = math.sqrt(rest.var(ddof=1) * autocorrelation_time([rest]) * (1.0 / len(head) + 1.0 / len(rest)))
-    return dropped * GROUP if abs(float(head.mean() - rest.mean())) > SIGNIFICANT * error else 0
+    error = math.sqrt(tail.var(ddof=1) * autocorrelation_time([tail]) * (1.0 / len(start) + 1.0 / len(tail)))
+    return dropped * GROUP if abs(float(start.mean() - tail.mean())) > SIGNIFICANT * error else 0
 
 
 def series_of(runs: Runs) -> dict[str, Array]:
@@ -244,9 +244,9 @@ def unseen_regime(figure: Statistic, runs: Runs, since: int) -> float:
     counted = np.sum([figure.moments(run).sum(axis=0) for run in runs], axis=0)
     middle, farthest = float(figure.of_sums(counted)), 0.0
     for run in runs:
-        whole = run.counted_from(since)
-        moments = figure.moments(whole)
-        stretches = max(len(whole.durations[since:]) // (STRETCH * whole.per_window), 1)
+        kept = run.counted_from(since)
+        moments = figure.moments(kept)
+        stretches = max(len(kept.durations[since:]) // (STRETCH * kept.per_window), 1)
         for part in np.array_split(moments, min(stretches, len(moments))):
             farthest = max(farthest, abs(float(figure.of_sums(part.sum(axis=0))) - middle))
     return farthest / (len(runs) + 1)
@@ -257,7 +257,7 @@ def slow_change(figure: Statistic, tested: Statistic, runs: Runs, since: int, *,
 
     ``moving``: whether any figure of the runs is ``drifting``; then the transient is not over for this one either.
     """
-    differences = (each for one in {figure, tested} for each in differences_of(one, runs))
+    differences = (difference for statistic in {figure, tested} for difference in differences_of(statistic, runs))
     bias = max((each.bias(moving) for each in differences), default=0.0)
     return math.hypot(bias, unseen_regime(figure, runs, since))
 

@@ -178,7 +178,7 @@ def companions_of(scene: Scene, runs: Sequence[Replicate]) -> Companions:
     if light is None:
         return usual_companions(scene)
     damping, method = max(
-        (numerical_damping(light, mean_step(runs, one), one), one) for one in {run.method for run in runs}
+        (numerical_damping(light, mean_step(runs, kind), kind), kind) for kind in {run.method for run in runs}
     )
     race = max(light.damping, LEAST_DAMPING)
     if damping <= NOTABLE_DAMPING * race:
@@ -197,8 +197,8 @@ def resolved_damping(damping: float, race: float) -> float:
 
 def mean_step(runs: Sequence[Replicate], method: str) -> float:
     """Mean step [s] of the runs by a method."""
-    own = [run for run in runs if run.method == method]
-    return sum(float(run.durations.sum()) for run in own) / sum(run.accepted_steps for run in own)
+    alike = [run for run in runs if run.method == method]
+    return sum(float(run.durations.sum()) for run in alike) / sum(run.accepted_steps for run in alike)
 
 
 def numerical_damping(light: LightContact, step: float, method: str) -> float:

@@ -70,8 +70,8 @@ class Replicate:
     def windows(self, force: int) -> Array:
         """Largest load of each whole impact window [N], by its place in the load vector."""
         forces = self.largest[self.first :, force]
-        whole = len(forces) // self.per_window
-        return forces[: whole * self.per_window].reshape(whole, self.per_window).max(axis=1)
+        windows = len(forces) // self.per_window
+        return forces[: windows * self.per_window].reshape(windows, self.per_window).max(axis=1)
 
     def _works(self) -> tuple[float, float, float]:
         """Work put in, work lost, change of energy [J]."""
@@ -119,7 +119,7 @@ class Statistic(NamedTuple):
     of_sums: Callable[[Array], Array]
     trend: "Statistic | None" = None
 
-    def of(self, run: Replicate) -> float:
+    def value(self, run: Replicate) -> float:
         """The figure of one replicate."""
         return float(self.of_sums(self.moments(run).sum(axis=0)))
 

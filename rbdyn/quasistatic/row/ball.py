@@ -119,18 +119,18 @@ def orbit_and_spin(spinning: Any, share: float, ci: float, si: float, co: float,
     at_i_o = ci * run_o + si * rise_o
     at_i_s = ci * run_s + si * rise_s
     n_i, p_o = g * si, -g * so
-    whole = 1.0 / (n * at_o + p * at_i)
-    whole_i = n_i * at_o + n * at_o_i + p * at_i_i
-    whole_o = n * at_o_o + p_o * at_i + p * at_i_o
-    whole_s = n * at_o_s + p * at_i_s
-    lead = n * at_o * whole
-    lead_i = (n_i * at_o + n * at_o_i - lead * whole_i) * whole
-    lead_o = (n * at_o_o - lead * whole_o) * whole
-    lead_s = (n * at_o_s - lead * whole_s) * whole
-    tip = n * p * rise * whole
-    tip_i = (n_i * p * rise + n * p * rise_i - tip * whole_i) * whole
-    tip_o = (n * p_o * rise + n * p * rise_o - tip * whole_o) * whole
-    tip_s = (n * p * rise_s - tip * whole_s) * whole
+    inverse = 1.0 / (n * at_o + p * at_i)
+    inverse_i = n_i * at_o + n * at_o_i + p * at_i_i
+    inverse_o = n * at_o_o + p_o * at_i + p * at_i_o
+    inverse_s = n * at_o_s + p * at_i_s
+    lead = n * at_o * inverse
+    lead_i = (n_i * at_o + n * at_o_i - lead * inverse_i) * inverse
+    lead_o = (n * at_o_o - lead * inverse_o) * inverse
+    lead_s = (n * at_o_s - lead * inverse_s) * inverse
+    tip = n * p * rise * inverse
+    tip_i = (n_i * p * rise + n * p * rise_i - tip * inverse_i) * inverse
+    tip_o = (n * p_o * rise + n * p * rise_o - tip * inverse_o) * inverse
+    tip_s = (n * p * rise_s - tip * inverse_s) * inverse
     difference = spinning.inner_speed - spinning.outer_speed
     orbit = spinning.outer_speed + difference * lead
     pull = 2.0 * spinning.orbit_mass * orbit * difference
@@ -194,9 +194,9 @@ def friction_force(force: float, limit: float) -> tuple[float, float, float]:
     beyond = (abs(force) / limit - STICKING) / (1.0 - STICKING)
     if beyond <= 0.0:
         return force, 1.0, 0.0
-    one = 1.0 / (1.0 + beyond)
-    part = STICKING + (1.0 - STICKING) * beyond * one
-    slope = one * one
+    inverse = 1.0 / (1.0 + beyond)
+    part = STICKING + (1.0 - STICKING) * beyond * inverse
+    slope = inverse * inverse
     side = 1.0 if force > 0.0 else -1.0
     return side * part * limit, slope, side * (part - abs(force) / limit * slope)
 

@@ -118,19 +118,19 @@ def eliminate(matrix: Any, vector: Any, size: int, least: float) -> bool:
             for k in range(i, size):
                 matrix[i, k], matrix[pivot, k] = matrix[pivot, k], matrix[i, k]
             vector[i], vector[pivot] = vector[pivot], vector[i]
-        one = 1.0 / matrix[i, i]
+        inverse = 1.0 / matrix[i, i]
         for k in range(i + 1, size):
-            factor = matrix[k, i] * one
+            factor = matrix[k, i] * inverse
             # Most of a matrix of all balls is zero and stays zero, for no ball touches another.
             if factor != 0.0:
                 for m in range(i + 1, size):
                     matrix[k, m] -= factor * matrix[i, m]
                 vector[k] -= factor * vector[i]
     for i in range(size - 1, -1, -1):
-        rest = vector[i]
+        value = vector[i]
         for k in range(i + 1, size):
-            rest -= matrix[i, k] * vector[k]
-        vector[i] = rest / matrix[i, i]
+            value -= matrix[i, k] * vector[k]
+        vector[i] = value / matrix[i, i]
     return True
 
 

@@ -83,7 +83,7 @@ def is_lifted(row: Any, j: int, a_axial: float, a_radial: float) -> bool:
 
 
 @kernel
-def rest(row: Any, j: int, balls: Any, a_axial: float, a_radial: float) -> None:
+def put_at_rest(row: Any, j: int, balls: Any, a_axial: float, a_radial: float) -> None:
     """Put a lifted ball at rest on the outer race, or without centrifugal force on the line of centres."""
     if row.centrifugal_force > 0.0:
         balls[j, 0] = 0.0
@@ -144,7 +144,7 @@ def settle(row: Any, j: int, a_axial: float, a_radial: float, share: float, ball
     It stops when the unbalanced force is below ``share`` of the contact loads.
     """
     if is_lifted(row, j, a_axial, a_radial):
-        rest(row, j, balls, a_axial, a_radial)
+        put_at_rest(row, j, balls, a_axial, a_radial)
         return
     x, y = wedge(row, j, a_axial, a_radial)
     pull = row.centrifugal_force
@@ -163,9 +163,9 @@ def settle(row: Any, j: int, a_axial: float, a_radial: float, share: float, ball
         residual = abs(fa) + abs(fr)
         if residual < share * contact_load:
             break
-        one = 1.0 / ((aa + damping) * (rr + damping) - ar * ar)
-        da = ((rr + damping) * fa - ar * fr) * one
-        dr = ((aa + damping) * fr - ar * fa) * one
+        inverse = 1.0 / ((aa + damping) * (rr + damping) - ar * ar)
+        da = ((rr + damping) * fa - ar * fr) * inverse
+        dr = ((aa + damping) * fr - ar * fa) * inverse
         scale, moved = 1.0, False
         while scale > SHORTEST and not moved:
             trial, contact_load_, fa_, fr_, aa_, ar_, rr_ = balance(
@@ -285,15 +285,15 @@ def eliminate_ball(row: Any, j: int, residual: Any, ring: Any, forces: Any, one_
     m2, m3 = -(b2 * by_a[0] + b3 * by_a[2]), -(b2 * by_a[1] + b3 * by_a[3])
     work[j, 0], work[j, 1] = da, dr
     work[j, 2], work[j, 3], work[j, 4], work[j, 5] = m0, m1, m2, m3
-    one = 1.0 / row.lever
+    inverse = 1.0 / row.lever
     ta = fa + ring_x[0] * da + ring_x[1] * dr
     tr = fr + ring_x[2] * da + ring_x[3] * dr
-    tm = ta + (fm + ring_x[4] * da + ring_x[5] * dr) * one
+    tm = ta + (fm + ring_x[4] * da + ring_x[5] * dr) * inverse
     aa = ring_a[0] + ring_x[0] * m0 + ring_x[1] * m2
     ar = ring_a[1] + ring_x[0] * m1 + ring_x[1] * m3
     ra_, rr_ = ring_a[2] + ring_x[2] * m0 + ring_x[3] * m2, ring_a[3] + ring_x[2] * m1 + ring_x[3] * m3
-    ma = aa + (ring_a[4] + ring_x[4] * m0 + ring_x[5] * m2) * one
-    mr = ar + (ring_a[5] + ring_x[4] * m1 + ring_x[5] * m3) * one
+    ma = aa + (ring_a[4] + ring_x[4] * m0 + ring_x[5] * m2) * inverse
+    mr = ar + (ring_a[5] + ring_x[4] * m1 + ring_x[5] * m3) * inverse
     return (ta, tr, tm), (aa, ar, ra_, rr_, ma, mr)
 
 
@@ -354,7 +354,7 @@ def assemble(task: Any, strength: float, mixed: bool, state: Any) -> None:
     for j in range(row.cosine.size):
         a_axial, a_radial = groove_centre(row, q, j)
         if is_lifted(row, j, a_axial, a_radial):
-            rest(row, j, balls, a_axial, a_radial)
+            put_at_rest(row, j, balls, a_axial, a_radial)
             work[j, LOADED] = 0.0
             sums[LARGEST] = max(sums[LARGEST], row.centrifugal_force)
             # The energy of a ball at rest on the outer race.

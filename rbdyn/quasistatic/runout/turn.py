@@ -83,13 +83,13 @@ def running_accuracy(
     return RunningAccuracy(*(1e-6 * float(limit) if limit else None for limit in limits))  # type: ignore[arg-type]
 
 
-def _rows(tolerance_class: str, of: str) -> list[dict[str, str]]:
-    return [row for row in table("tolerance_classes") if (row["class"], row["of"]) == (tolerance_class, of)]
+def _rows(tolerance_class: str, part: str) -> list[dict[str, str]]:
+    return [row for row in table("tolerance_classes") if (row["class"], row["of"]) == (tolerance_class, part)]
 
 
-def _row(tolerance_class: str, of: str, millimetres: float) -> dict[str, str] | None:
+def _row(tolerance_class: str, part: str, millimetres: float) -> dict[str, str] | None:
     """The row of a class for a bore, or an outside diameter."""
-    rows = _rows(tolerance_class, of)
+    rows = _rows(tolerance_class, part)
     if not rows or millimetres <= float(rows[0]["above"]):
         return None
     return next((row for row in rows if millimetres <= float(row["up_to"]) * (1.0 + 1e-12)), None)
@@ -524,14 +524,14 @@ def follow(
     steps, size = balls.azimuth.shape
     force, free, displacement = boundary_conditions(row, load, constraint)
     # Positions and reaches have the same order in ``Row`` and ``BallPath``.
-    places = (own + change for own, change in zip(row[2:6], balls[2:6], strict=True))
+    places = (start + change for start, change in zip(row[2:6], balls[2:6], strict=True))
     changes = np.stack((np.cos(balls.azimuth), np.sin(balls.azimuth), *places))
     # ``walk`` overwrites its row.
-    own = Row._make((*np.zeros((6, size)), *row[6:]))
+    start = Row._make((*np.zeros((6, size)), *row[6:]))
     state = space(size)
     state.q[:] = displacement
     path, figures = np.zeros((steps, RING)), np.zeros((steps, FIGURES))
-    reached, newton_steps = walk(Task(control, own, force, free), changes, state, path, figures)
+    reached, newton_steps = walk(Task(control, start, force, free), changes, state, path, figures)
     if reached < steps:
         raise RunError(
             f"runout: no equilibrium at step {reached + 1} of {steps}; reduce the form errors or raise the load"
