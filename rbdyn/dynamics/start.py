@@ -150,8 +150,8 @@ def _machine(scene: Scene, state: State, before: Sequence[float] | None) -> Mach
     cold = np.array(before or thermal.start.temperatures(thermal.ambient_C), dtype=np.float64)
     course = thermal.start.course(turning_speed(scene), scene.operation.radial_load_N)
     parts, boundaries = capacities(hot, thermal), state.model.boundaries
-    whole, _ = warming.Surroundings(state.model.conductances, seats_of(hot), boundaries).network()
-    end = float(course.times[-1]) + warming.SETTLED * warming.slowest(parts, whole)
+    matrix, _ = warming.Surroundings(state.model.conductances, seats_of(hot), boundaries).network()
+    end = float(course.times[-1]) + warming.SETTLED * warming.slowest(parts, matrix)
     return Machine(scene, hot, thermal, parts, course, cold, state, boundaries, end)
 
 
@@ -337,8 +337,8 @@ def _verdict(machine: Machine, law: warming.Law, path: Path) -> tuple[str, str]:
     for part, ceiling in ceilings(machine.scene).items():
         if (over := np.flatnonzero(parts[part] > ceiling)).size:
             return "too hot", f"after {times[over[0]]:.3g} s the {part} passes its ceiling of {ceiling:g} C"
-    rest = law.net_heat(machine.course)(float(times[-1]), nodes[-1]) / machine.capacities
-    if np.abs(rest).max() * warming.slowest(machine.capacities, law.matrices[0]) > warming.MOVING:
+    imbalance = law.net_heat(machine.course)(float(times[-1]), nodes[-1]) / machine.capacities
+    if np.abs(imbalance).max() * warming.slowest(machine.capacities, law.matrices[0]) > warming.MOVING:
         return "undecided", f"{at} the temperatures still move"
     return "steady", ""
 

@@ -58,8 +58,8 @@ class Here(NamedTuple):
 
     def net(self, nodes: Array) -> Array:
         """Heat of the nodes less what the network carries off (6,) [W], that of a machine at rest too."""
-        whole, inflow = self.network
-        return warming.padded(self.heat.heat) + inflow - whole @ nodes
+        matrix, inflow = self.network
+        return warming.padded(self.heat.heat) + inflow - matrix @ nodes
 
 
 class Machine(NamedTuple):
@@ -187,8 +187,8 @@ def _machine(scene: SingleRowScene, search: Search) -> Machine:
     cold = np.array(thermal.start.temperatures(thermal.ambient_C), dtype=np.float64)
     course = thermal.start.course(turning_speed(scene), math.hypot(*scene.operation.load[:2]))
     parts = capacities(found.scene, thermal.start.widths)
-    whole, _ = _surroundings(found).network()
-    end = float(course.times[-1]) + warming.SETTLED * warming.slowest(parts, whole)
+    matrix, _ = _surroundings(found).network()
+    end = float(course.times[-1]) + warming.SETTLED * warming.slowest(parts, matrix)
     return Machine(scene, thermal, parts, course, cold, search, end)
 
 
@@ -254,8 +254,8 @@ def _gain(machine: Machine, time: float, nodes: Array) -> float:
         ]
     except InputError:
         return math.inf
-    whole, _ = machine.at(time, nodes).network
-    return float(np.linalg.eigvals(np.eye(len(nodes)) + np.linalg.solve(whole, np.array(slopes).T)).real.max())
+    matrix, _ = machine.at(time, nodes).network
+    return float(np.linalg.eigvals(np.eye(len(nodes)) + np.linalg.solve(matrix, np.array(slopes).T)).real.max())
 
 
 def _runaway(machine: Machine, path: Path) -> str:
@@ -291,8 +291,8 @@ def _verdict(machine: Machine, path: Path) -> tuple[str, str]:
     if ends_there and machine.search.status == "steady" and gap > warming.STEADY:
         return "undecided", f"it ends {gap:.0f} K from the steady state of the first guess, so the balance has several"
     last = path.here[-1]
-    rest = last.net(nodes[-1]) / machine.capacities
-    if np.abs(rest).max() * warming.slowest(machine.capacities, last.network[0]) > warming.MOVING:
+    imbalance = last.net(nodes[-1]) / machine.capacities
+    if np.abs(imbalance).max() * warming.slowest(machine.capacities, last.network[0]) > warming.MOVING:
         return "undecided", f"after {times[-1]:.3g} s the temperatures still move"
     return "steady", ""
 
@@ -435,12 +435,12 @@ def _loads_of_sets(
     last = len(rows.times) - 1
     found, impossible = np.full((len(LOADS), len(thermals)), np.nan), np.zeros(len(thermals), dtype=bool)
     for place, thermal in enumerate(thermals):
-        own = machine._replace(scene=machine.scene.model_copy(update={"thermal": thermal}))
+        varied = machine._replace(scene=machine.scene.model_copy(update={"thermal": thermal}))
         least = int(figures["radial_um"][:, place].argmin())
         for row in {least, last, *(int(column[:, place].argmax()) for column in expected)}:
             nodes = rows.temperatures[row, place]
             try:
-                here = own.at(float(rows.times[row]), np.minimum(nodes, HOTTEST))
+                here = varied.at(float(rows.times[row]), np.minimum(nodes, HOTTEST))
             except InputError:
                 impossible[place] = True
                 continue

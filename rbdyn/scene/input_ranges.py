@@ -163,7 +163,7 @@ def law_of_sets(law: "Law", around: Sequence["Surroundings"], varied: Sequence[V
     return law._replace(
         powers=law.powers * np.array([level for *_, level in varied])[:, np.newaxis, :],
         shares=np.array([dry + thermal.film_share_to_oil * (wet - dry) for thermal, *_ in varied]),
-        matrices=np.array([[whole for whole, _ in row] for row in networks]),
+        matrices=np.array([[matrix for matrix, _ in row] for row in networks]),
         sources=np.array([[inflow for _, inflow in row] for row in networks]),
     )
 

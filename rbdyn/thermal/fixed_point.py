@@ -29,7 +29,7 @@ MOST_STATES, MOST_HALVINGS = 16, 6
 TOLERANCE, VAGUE, CLEAR = 0.2, 20.0, 3.0
 # Gain near one, from which the model's solution would lie far beyond what its slopes are good for.
 NEARLY_UNSTABLE = 0.95
-# States from which the rest of a model is learned, and their distance at most [K].
+# States from which the residue of a model is learned, and their distance at most [K].
 LEARNED, NEAR = 3, 40.0
 # Part of the steps between states in a direction, over the largest, from which slopes there are learned.
 ALIKE = 0.1
@@ -96,7 +96,7 @@ def learned(slopes: Array, steps: Array, changes: Array, alike: float = 1e-12) -
 
 
 def model_of(states: Sequence[State]) -> HeatModel:
-    """Model of the balance about the last state: viscosity by its exponents, and the rest that near states show beyond that."""
+    """Model of the balance about the last state: viscosity by its exponents, and the residue that near states show beyond that."""
     last = states[-1]
     model = last.model
     for other in states[:-1]:
@@ -115,7 +115,7 @@ def model_of(states: Sequence[State]) -> HeatModel:
 
 
 def next_step(model: HeatModel, state: State, before: Array | None) -> Array:
-    """Step (4,) [K] to the stable solution of the model; where that has none, by its slopes or, if these are unstable, without its rest.
+    """Step (4,) [K] to the stable solution of the model; where that has none, by its slopes or, if these are unstable, without its residue.
 
     ``before``: the step that led here. A step that turns back is at most half as long.
     """

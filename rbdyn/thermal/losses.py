@@ -120,7 +120,7 @@ class HeatModel(NamedTuple):
         return np.asarray(np.linalg.solve(self.matrix, self.heat_slopes(nodes)))
 
     def with_image_slopes(self, slopes: Array) -> Self:
-        """The model with the rest that gives it the slopes dM/dT at its state."""
+        """The model with the residue that gives it the slopes dM/dT at its state."""
         viscous = self._replace(residue=np.zeros_like(self.residue)).heat_slopes(self.losses.temperatures)
         return self._replace(residue=self.matrix @ slopes - viscous)
 
