@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from rbdyn.thermal.losses import HeatModel, Losses, no_rest
+from rbdyn.thermal.losses import HeatModel, Losses, no_residue
 from rbdyn.thermal.network import INNER, NODES, OUTER, Boundaries, Conductances, matrix, temperatures
 from rbdyn.thermal.start import (
     HOUSING,
@@ -169,7 +169,7 @@ FILMS = np.array([[0.0, 0.5, 0.0, 0.5, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0, 0.0, 0.0]
 SHARES = np.array([[0.3, 0.35, 0.0, 0.35, 0.0, 0.0], [0.5, 0.0, 0.5, 0.0, 0.0, 0.0]])
 PRIORS = np.array([[0.7, 1.7, 0.0], [0.0, 1.0, 0.0]])
 LOSSES = Losses(COLD[:4], np.ones(2), PRIORS[:, 0], FILMS[:, :4], VISCOSITY)
-MODEL = HeatModel(LOSSES, SHARES[:, :4], BATH, AROUND, no_rest())
+MODEL = HeatModel(LOSSES, SHARES[:, :4], BATH, AROUND, no_residue())
 REACH = np.vstack((FILMS / 15.0, np.array([[0.0, 0.3, -0.3, -0.2, 0.0, 0.0]]))), np.array([0.35, 0.35])
 
 
