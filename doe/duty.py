@@ -24,7 +24,7 @@ from rbdyn.dynamics.figures import FIGURES
 from rbdyn.result import Quantity, SimulationResult, arrays_of
 from rbdyn.scene import Scene
 from rbdyn.scene.duty import AMBIENT, starting
-from rbdyn.verdict.replicates import CageVerdict
+from rbdyn.verdict.orbits import CageVerdict
 
 if TYPE_CHECKING:
     from doe.emulator import NoisyValues

@@ -12,7 +12,7 @@ from rbdyn.base.notes import Note, Notes
 from rbdyn.base.records import Record, derived, nullable, shown, spread, written
 from rbdyn.base.words import Brief, Figure, counted, error_alone, quantity, value_alone
 from rbdyn.clearances import DIFFERENCE
-from rbdyn.verdict.replicates import CageVerdict
+from rbdyn.verdict.orbits import CageVerdict
 
 if TYPE_CHECKING:
     import pandas as pd

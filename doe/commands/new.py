@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from doe.workflow.problem import Problem
     from rbdyn.scene import Scene
     from rbdyn.scene.duty import DutyPoint
-    from rbdyn.verdict.replicates import CageVerdict
+    from rbdyn.verdict.orbits import CageVerdict
 
 
 RESOLUTION_MM, SMALLEST_STEP_MM = 0.001, 0.002

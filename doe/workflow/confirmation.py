@@ -26,7 +26,7 @@ from rbdyn.base.words import chance, decimals, improvement, quantity, with_error
 from rbdyn.result import TEMPERATURES, Quantity, arrays_of
 from rbdyn.scene import Scene
 from rbdyn.scene.thermal import simulated_scene
-from rbdyn.verdict.replicates import CageVerdict
+from rbdyn.verdict.orbits import CageVerdict
 
 # Key of the only scene of a study without a duty.
 EVERYWHERE = ""

@@ -20,7 +20,7 @@ from rbdyn.base.arrays import Array, one_thread
 from rbdyn.base.faults import InputError
 from rbdyn.base.records import Record, finite, keyed
 from rbdyn.base.words import chance
-from rbdyn.life.duty import DutyLife
+from rbdyn.life import DutyLife
 from rbdyn.result import arrays_of
 from rbdyn.scene import Scene
 

@@ -58,7 +58,7 @@ from rbdyn.base.faults import InputError, MethodError, check_all
 from rbdyn.base.notes import Note, Notes
 from rbdyn.base.records import Record
 from rbdyn.clearances import REPORTED
-from rbdyn.life.duty import life_notes
+from rbdyn.life import life_notes
 from rbdyn.properties.catalogue import classes_at
 from rbdyn.scene import Scene
 from rbdyn.scene.notes import catalogue_entry

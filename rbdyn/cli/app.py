@@ -184,7 +184,7 @@ def _write_map(mapped: "SlipMap", duty: "MapDuty | None", folder: Path) -> list[
     """Write map.json, map.csv and map.png, with a duty also duty.csv; returns the file names."""
     from rbdyn.base.files import write_json
     from rbdyn.dynamics.slip_map import map_sheet
-    from rbdyn.life.duty import life_sheet
+    from rbdyn.life import life_sheet
     from rbdyn.plots.roller import draw_slip_map
 
     write_json(folder / "map.json", _map_record(mapped, duty))

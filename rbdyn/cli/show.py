@@ -19,7 +19,7 @@ from rbdyn.base.words import counted, quantity, shown, with_error
 from rbdyn.result import SimulationResult
 from rbdyn.scene import Scene
 from rbdyn.scene.thermal import simulated_scene
-from rbdyn.verdict.replicates import CageVerdict
+from rbdyn.verdict.orbits import CageVerdict
 
 if TYPE_CHECKING:
     from rbdyn.base.words import Notice

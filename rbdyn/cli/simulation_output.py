@@ -14,7 +14,7 @@ from rbdyn.base.records import Record, finite, save_table
 from rbdyn.base.words import counted, error_alone, label, quantity, range_ends, shown, value_alone, with_error
 from rbdyn.clearances import DIFFERENCE, REPORTED, other_ranges
 from rbdyn.dynamics.figures import BEARING, DAMAGE, of_kind, repeated
-from rbdyn.life.duty import PointLife, life_notes, life_sheet
+from rbdyn.life import PointLife, life_notes, life_sheet
 from rbdyn.properties.rexs import Attributes, write_rexs
 from rbdyn.result import (
     GreatestValue,

@@ -7,8 +7,7 @@ from rbdyn.base.arrays import Complex
 from rbdyn.dynamics.statistics.replicate import Replicate
 from rbdyn.losses import LAND_DAMPING, LAND_FRICTION, POCKET_DAMPING, POCKET_FRICTION
 from rbdyn.scene import Scene
-from rbdyn.verdict.orbits import BLOCK_TURNS, Forcing, mean_measures
-from rbdyn.verdict.replicates import CageVerdict, Trial, cage_verdict
+from rbdyn.verdict.orbits import BLOCK_TURNS, CageVerdict, Forcing, Trial, cage_verdict, mean_measures
 
 RUBBING = [POCKET_FRICTION, POCKET_DAMPING, LAND_FRICTION, LAND_DAMPING]
 # Share of the samples with a loaded contact of the inner race, below which films alone drive the rollers.

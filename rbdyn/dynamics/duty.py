@@ -8,8 +8,7 @@ import numpy as np
 from rbdyn.base.arrays import Array
 from rbdyn.contact.hertz_line import iso_16281
 from rbdyn.dynamics.parameters.model import roller_relief
-from rbdyn.life import turning_rings
-from rbdyn.life.duty import ROLLER_EXPONENT, DutyLife, LoadCase, duty_life
+from rbdyn.life import ROLLER_EXPONENT, DutyLife, LoadCase, duty_life, turning_rings
 from rbdyn.life.rollers import ReferenceLife, RollerContacts, Stiffness, reference_life, static_loads, static_stiffness
 from rbdyn.properties.materials import equivalent_modulus
 from rbdyn.scene import Scene

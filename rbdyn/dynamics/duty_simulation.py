@@ -20,7 +20,7 @@ from rbdyn.dynamics.duty import load_case
 from rbdyn.dynamics.ensemble import Reporter, log, plan_of, threads_of
 from rbdyn.dynamics.figures import FIGURES
 from rbdyn.dynamics.simulate import simulate
-from rbdyn.life.duty import ROLLER_EXPONENT, duty_life, life_notes, life_sheet
+from rbdyn.life import ROLLER_EXPONENT, duty_life, life_notes, life_sheet
 from rbdyn.result import (
     LeastClearance,
     Quantity,
@@ -35,7 +35,7 @@ from rbdyn.scene import Scene, rollers_only
 from rbdyn.scene.duty import AMBIENT, DutyPoint, duty_scenes, read_duty, shares_of_time, starting
 from rbdyn.scene.thermal import simulated_scene
 from rbdyn.thermal.network import NODES
-from rbdyn.verdict.replicates import CageVerdict
+from rbdyn.verdict.orbits import CageVerdict
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -38,7 +38,7 @@ from rbdyn.losses import POWER_TERMS
 from rbdyn.mounting.cage import OperatingClearance
 from rbdyn.result import SimulationResult
 from rbdyn.scene import Scene, rollers_only
-from rbdyn.scene.start import point_before
+from rbdyn.scene.thermal import point_before
 
 # Above this relative gap of the power balance a note asks for a tighter tolerance.
 LARGEST_POWER_GAP = 0.005

@@ -37,7 +37,7 @@ from rbdyn.result import Quantity, cage_column, figure_columns
 from rbdyn.scene import Scene
 from rbdyn.scene.duty import AXES
 from rbdyn.scene.thermal import first_guess_faults
-from rbdyn.verdict.replicates import CageVerdict
+from rbdyn.verdict.orbits import CageVerdict
 
 if TYPE_CHECKING:
     import pandas as pd

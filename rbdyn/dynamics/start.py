@@ -49,8 +49,7 @@ from rbdyn.result import (
     StartResult,
 )
 from rbdyn.scene import Scene, input_ranges
-from rbdyn.scene.start import point_before
-from rbdyn.scene.thermal import Temperatures, at_temperatures, ceilings
+from rbdyn.scene.thermal import Temperatures, at_temperatures, ceilings, point_before
 from rbdyn.thermal import start as warming
 from rbdyn.thermal.fixed_point import State
 from rbdyn.thermal.losses import HOTTEST

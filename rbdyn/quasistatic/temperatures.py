@@ -6,7 +6,7 @@ ranges of the temperatures over the documented inputs of the balance follow from
 
 The heat is that of SKF's friction model. The loads of the friction are those of the equilibrium at the temperatures of the nodes: a ring that warms changes clearance,
 contact angle and, where it is fixed axially, its preload. A ball's own losses are not computed; SKF's rolling and sliding moment
-are split over the nodes as those of rollers are (``rbdyn.thermal.heat``), half of each to either race.
+are split over the nodes as those of rollers are (``rbdyn.thermal.losses``), half of each to either race.
 
 SKF's model is for normal clearance. In a deep groove bearing the ball loads beyond those that carry the load count as preload;
 angular contact bearings relieve a radial growth by their axial load, which the model has.
@@ -51,8 +51,7 @@ from rbdyn.scene.operation import raceway_radii
 from rbdyn.scene.thermal import Temperatures, Thermal, inlet_temperature, oil_ceiling, part_temperatures
 from rbdyn.thermal.conductances import half_space_contact, oil_flow, seats, sump, surface_coefficient
 from rbdyn.thermal.fixed_point import Search, State, model_of, steady_state
-from rbdyn.thermal.heat import TERMS, Effusivities, shares
-from rbdyn.thermal.losses import HeatModel, Losses, gain, log_viscosity, no_residue
+from rbdyn.thermal.losses import TERMS, Effusivities, HeatModel, Losses, gain, log_viscosity, no_residue, shares
 from rbdyn.thermal.network import NODES, OIL, Boundaries, Conductances, carried_off, temperatures
 
 # Series of SKF's table 3a by the diameter series of ISO 15.
@@ -168,7 +167,7 @@ def friction_of(scene: SingleRowScene, model: RowModel, loads: Loads) -> Frictio
 
 
 def powers_of(scene: SingleRowScene, moments: FrictionMoments) -> Array:
-    """Losses in the order of ``heat.TERMS`` [W], (terms,): half of each moment's power at either race."""
+    """Losses in the order of ``losses.TERMS`` [W], (terms,): half of each moment's power at either race."""
     inner, outer = scene.operation.speeds
     rolling, sliding = (0.5 * abs(inner - outer) * moment for moment in moments)
     by_kind = {"race_traction": sliding, "rolling_resistance": rolling}

@@ -6,7 +6,7 @@ scene into the SI parameters of the kernels. ``Scene``, a roller bearing, is in 
 - ``bearing``: drawing of bearing and cage, materials; ``operation``: speeds, loads, support, mounting
 - ``lubricant``: oil and traction; ``laws``: laws of the interactions, and numerics
 - ``ball``: scene of a ball bearing; ``reading``: scenes from files and tables
-- ``thermal``: heat balance; ``start``: warming of a cold machine; ``input_ranges``: what the unknown inputs of the balance leave open
+- ``thermal``: heat balance and warming of a cold machine; ``input_ranges``: what the unknown inputs of the balance leave open
 - ``geometry``: radii, masses and speeds; ``fits``: rings, clearances and grooves as mounted; ``notes``: suspicious values
 - ``uncertain``: declared unknown inputs; ``unknown``: the unknown inputs of a scene; ``keys``: descriptions of all keys,
   and columns of tables named by them; ``duty``: points of operation
@@ -57,12 +57,12 @@ from rbdyn.scene.lubricant import (
 from rbdyn.scene.notes import catalogue_entry, catalogue_notes, unit_notes
 from rbdyn.scene.operation import Mounting, Operation, Support, misfits
 from rbdyn.scene.reading import SceneFile
-from rbdyn.scene.start import start_faults
 from rbdyn.scene.thermal import (
     FilmTemperatures,
     Thermal,
     film_temperatures,
     oil_ceiling,
+    start_faults,
     thermal_faults,
     with_first_guess,
 )

@@ -14,8 +14,7 @@ from rbdyn.scene.lubricant import Lubricant
 from rbdyn.scene.operation import BallOperation, Mounting, Speed
 from rbdyn.scene.operation import misfits as mounting_faults
 from rbdyn.scene.reading import SceneFile
-from rbdyn.scene.start import start_faults
-from rbdyn.scene.thermal import NO_MOUNTING, Thermal, oil_ceiling, thermal_faults, with_first_guess
+from rbdyn.scene.thermal import NO_MOUNTING, Thermal, oil_ceiling, start_faults, thermal_faults, with_first_guess
 
 if TYPE_CHECKING:
     from rbdyn.base.arrays import Array

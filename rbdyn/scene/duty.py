@@ -24,11 +24,10 @@ from rbdyn.base.faults import (
     validated,
 )
 from rbdyn.base.tables.sheet import InputTable, Limits, listed, read_sheet
-from rbdyn.life.duty import SHARE_ROUNDING
+from rbdyn.life import SHARE_ROUNDING
 from rbdyn.scene import Scene
 from rbdyn.scene.keys import key_values, unknown_keys
-from rbdyn.scene.start import ORIGINS
-from rbdyn.scene.thermal import first_guess_faults
+from rbdyn.scene.thermal import ORIGINS, first_guess_faults
 from rbdyn.scene.uncertain import DECLARATIONS, SEEDS
 
 MOST_POINTS = 12

@@ -16,8 +16,7 @@ from rbdyn.base.arrays import Array
 from rbdyn.base.notes import Note, Notes
 from rbdyn.base.records import Record, keyed
 from rbdyn.clearances import DIFFERENCE
-from rbdyn.thermal.heat import TERMS
-from rbdyn.thermal.losses import HOTTEST, HeatModel
+from rbdyn.thermal.losses import HOTTEST, TERMS, HeatModel
 from rbdyn.thermal.network import INNER, NODES, OUTER
 
 if TYPE_CHECKING:

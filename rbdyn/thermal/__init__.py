@@ -2,8 +2,7 @@
 
 - ``network``: four nodes, their steady temperatures, and the heat by way out
 - ``conductances``: oil flow, surfaces to the oil, race contacts, seats in housing and on shaft, from sizes and materials
-- ``heat``: heat of each node from the power lost in each term
-- ``losses``: the balance about a state, and steady temperatures of many sets of inputs
+- ``losses``: heat of each node from the power lost in each term, the balance about a state, and steady temperatures of many sets of inputs
 - ``oil_fraction``: share of oil in the cavity of a bearing under a jet, from its flow
 - ``fixed_point``: temperatures that their own heat keeps up, the gain of the loop, and the verdict where there are none
 - ``start``: temperatures over time while a machine warms, with housing and shaft as nodes of their own

@@ -1,4 +1,4 @@
 """Verdict on a cage from its orbit; it knows no bearing.
 
-- ``orbits``: measures of an orbit and its class; ``replicates``: share of each class among bearings alike, and the verdict
+- ``orbits``: measures of an orbit and its class, share of each class among bearings alike, and the verdict
 """

@@ -12,8 +12,7 @@ from typer.main import get_command
 from rbdyn.cli import manual
 from rbdyn.cli.app import app
 from rbdyn.cli.manual import kinds
-from rbdyn.cli.manual.drawings import drawings
-from rbdyn.cli.manual.page import page
+from rbdyn.cli.manual.page import drawings, page
 from rbdyn.scene.keys import Part
 
 ROOT = Path(__file__).parents[2]

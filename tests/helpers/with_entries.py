@@ -92,7 +92,7 @@ def loss() -> dict[str, bool]:
     from doe.clearance import responses_of
     from rbdyn.dynamics.parameters.heat import TERMS_OF_POWERS
     from rbdyn.losses import POWER_TERMS
-    from rbdyn.thermal.heat import TERMS, Effusivities, shares
+    from rbdyn.thermal.losses import TERMS, Effusivities, shares
 
     row = TERMS.index("grease_churning")
     return {

@@ -16,8 +16,7 @@ from manual_parts import ROOT, declared, parts, whole_page
 from short_studies import EXAMPLES
 
 import rbdyn
-from rbdyn.cli.manual.drawings import roller_bearing, scene_of
-from rbdyn.cli.manual.page import DIVISIONS, FOLDED, markdown, rendered
+from rbdyn.cli.manual.page import DIVISIONS, FOLDED, markdown, rendered, roller_bearing, scene_of
 from rbdyn.plots.sketches import clearances
 from rbdyn.quasistatic.sweep import SWEEPS, sweep
 from rbdyn.scene import Scene

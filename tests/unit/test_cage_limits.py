@@ -20,8 +20,7 @@ from doe.workflow.confirmation import Confirmed, Limit, class_limits, limits_of
 from doe.workflow.problem import Problem
 from doe.workflow.robust import case_of_study
 from rbdyn.base.faults import InputError
-from rbdyn.verdict.orbits import Forcing, Orbit, Thresholds
-from rbdyn.verdict.replicates import CageVerdict, Trial, cage_verdict
+from rbdyn.verdict.orbits import CageVerdict, Forcing, Orbit, Thresholds, Trial, cage_verdict
 
 ORBITS = {
     "held": Orbit(0.9, 0.02, 0.4, 3.0),

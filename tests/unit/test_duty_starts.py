@@ -11,7 +11,7 @@ from rbdyn import Scene, simulate
 from rbdyn.base.faults import InputError
 from rbdyn.dynamics.duty_simulation import DutySimulation, simulate_duty
 from rbdyn.scene.duty import duty_scenes, read_duty, starting
-from rbdyn.scene.start import point_before
+from rbdyn.scene.thermal import point_before
 
 # Simulations of the heat alone, long enough for it.
 QUICK = {"turns": 20.0, "discard_turns": 10.0, "replicates": 2, "extend": False, "companion": False}

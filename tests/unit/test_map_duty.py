@@ -15,7 +15,7 @@ from rbdyn.cli.app import map_blocks
 from rbdyn.cli.simulation_output import map_duty
 from rbdyn.dynamics.duty import static_life
 from rbdyn.dynamics.slip_map import PANELS, Point, SlipMap
-from rbdyn.life.duty import life_notes
+from rbdyn.life import life_notes
 from rbdyn.result import Quantity
 from rbdyn.scene.duty import AXES, duty_scenes, read_duty
 

@@ -3,8 +3,19 @@
 import numpy as np
 import pytest
 
-from rbdyn.verdict.orbits import Forcing, Orbit, Thresholds, mean_measures, orbit_class, orbit_measures
-from rbdyn.verdict.replicates import Share, Trial, cage_verdict, class_shares, verdict
+from rbdyn.verdict.orbits import (
+    Forcing,
+    Orbit,
+    Share,
+    Thresholds,
+    Trial,
+    cage_verdict,
+    class_shares,
+    mean_measures,
+    orbit_class,
+    orbit_measures,
+    verdict,
+)
 
 PLAY = 100e-6
 TURNS = np.arange(64 * 10) / 64

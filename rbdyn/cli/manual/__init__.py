@@ -1,8 +1,8 @@
 """``rbdyn keys``, every key of a scene, and ``rbdyn manual``, one page that opens from disk.
 
 - ``prose``: the chapters in Markdown, in the order of their file names
-- ``page``: chapters, keys, commands, equations and library as HTML, from docstrings and from the commands themselves
-- ``drawings``: sketches of clearances, axes and signs, which a chapter names as a picture
+- ``page``: chapters, keys, commands, equations and library as HTML, from docstrings and from the commands themselves; sketches of
+  clearances, axes and signs, which a chapter names as a picture
 
 Packages that build on ``rbdyn`` add their part by an entry point; their prose is in them.
 """
@@ -33,8 +33,7 @@ def manual(
     with guarded(as_json), output_folder(out, "rbdyn manual", (PAGE,), force=force) as folder:
         from importlib.metadata import entry_points
 
-        from rbdyn.cli.manual.drawings import drawings
-        from rbdyn.cli.manual.page import page
+        from rbdyn.cli.manual.page import drawings, page
         from rbdyn.scene.keys import Part
 
         folder.claim()
@@ -67,7 +66,7 @@ def tables() -> dict[str, list[Sheet[Any]]]:
     from rbdyn.dynamics.figures import FIGURES
     from rbdyn.dynamics.motion import history_sheet
     from rbdyn.dynamics.slip_map import map_sheet
-    from rbdyn.life.duty import life_sheet
+    from rbdyn.life import life_sheet
     from rbdyn.quasistatic.result import ball_sheet
     from rbdyn.quasistatic.runout.turn import RUNOUT
     from rbdyn.quasistatic.sweep import SWEEPS

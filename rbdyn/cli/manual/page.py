@@ -2,12 +2,13 @@
 
 import ast
 import re
+import tomllib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from html import escape
 from importlib.metadata import version
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import typer
 from markdown_it import MarkdownIt
@@ -15,9 +16,13 @@ from markdown_it.renderer import RendererProtocol
 from markdown_it.token import Token
 
 from rbdyn.base.words import filled_page
-from rbdyn.cli.manual.drawings import roller_bearing
-from rbdyn.plots.sketches import Sketch
+from rbdyn.draft.options import OIL, TEMPERATURE_C, Options
+from rbdyn.draft.text import scene_text
+from rbdyn.plots.sketches import Sketch, ball_axes, clearances, roller_axes
 from rbdyn.scene.keys import Key, Part, keys, lines
+
+if TYPE_CHECKING:
+    from rbdyn.scene import Scene
 
 Named = ast.ClassDef | ast.FunctionDef
 # An equation, its number, or the year of its source.
@@ -308,3 +313,27 @@ def commands_of(part: Part) -> Iterator[str]:
 def plain(text: str) -> str:
     """Text without emphasis in Markdown."""
     return text.replace("*", r"\*")
+
+
+ROLLERS, BALLS = "NU210", "7210B"
+
+
+def roller_bearing() -> "Scene":
+    """The roller bearing that the manual takes from its name to clearances."""
+    from rbdyn.scene import Scene
+
+    return Scene.from_dict(scene_of(ROLLERS), ROLLERS)
+
+
+def drawings(scene: "Scene") -> Mapping[str, Sketch]:
+    """The drawings by the names that chapters use; those of rollers are of the scene."""
+    from rbdyn.scene.ball import SingleRowScene
+
+    balls = SingleRowScene.from_dict(scene_of(BALLS), BALLS)
+    return {"clearances": clearances(scene), "roller_axes": roller_axes(scene), "ball_axes": ball_axes(balls)}
+
+
+def scene_of(designation: str, options: Mapping[str, str] | None = None) -> dict[str, Any]:
+    """The scene that ``rbdyn new`` writes of a designation and options."""
+    texts: dict[str, str | None] = {"--oil": OIL, "--temperature": f"{TEMPERATURE_C:g}", **(options or {})}
+    return tomllib.loads(scene_text(designation, Options(texts)))

@@ -28,8 +28,7 @@ from rbdyn.thermal.conductances import (
     surface_coefficient,
     surfaces,
 )
-from rbdyn.thermal.heat import GUIDES, TERMS, Effusivities, shares
-from rbdyn.thermal.losses import HeatModel, Losses, no_residue
+from rbdyn.thermal.losses import GUIDES, TERMS, Effusivities, HeatModel, Losses, no_residue, shares
 from rbdyn.thermal.network import NODES, OIL, ROLLERS, Boundaries, Conductances, matrix, source
 from rbdyn.thermal.oil_fraction import fraction_notes, residence
 
@@ -50,7 +49,7 @@ TERMS_OF_POWERS = _terms_of_powers()
 class Network(NamedTuple):
     """Network of a bearing at temperatures.
 
-    ``term_shares`` (terms, 4): of each node in each term of ``heat.TERMS``. ``windage`` [W]: a loss that no power of the simulation
+    ``term_shares`` (terms, 4): of each node in each term of ``losses.TERMS``. ``windage`` [W]: a loss that no power of the simulation
     has.
     """
 
@@ -90,7 +89,7 @@ def network_of(hot: Scene, thermal: Thermal, bearing: RollerBearing) -> Network:
 
 
 def term_shares(hot: Scene, film_to_oil: float) -> Array:
-    """Shares (terms, 4) of the nodes in each term of ``heat.TERMS``, with ``film_to_oil`` of the heat of films in the oil."""
+    """Shares (terms, 4) of the nodes in each term of ``losses.TERMS``, with ``film_to_oil`` of the heat of films in the oil."""
     effusivities = Effusivities(*(hot.material(part).effusivity for part in ("rings", "roller", "cage")))
     return shares(effusivities, hot.cage.guidance, film_to_oil)
 
