@@ -49,30 +49,30 @@ Data = Annotated[Path | None, valued("TABLE.csv", "Use this table of runs instea
 Scheduler = Annotated[
     str | None, valued("ADDRESS", "Run on the dask cluster with this scheduler.", "threads of this machine")
 ]
-Retry = Annotated[bool, flag("--retry", says="Run failed points again.")]
+Retry = Annotated[bool, flag("--retry", help="Run failed points again.")]
 Part = Annotated[
     str | None, valued("K/N", "Run only part K of N, for a queue; without it gather all parts.", "all runs")
 ]
 Adaptive = Annotated[
-    bool, flag("--adaptive", says="Search the Pareto front with emulators (few extra runs) and select from it.")
+    bool, flag("--adaptive", help="Search the Pareto front with emulators (few extra runs) and select from it.")
 ]
 Robust = Annotated[
     bool,
     flag(
         "--robust",
-        says="Compute the probability that the selected design is better despite unknown inputs; automatic with the table robust.",
+        help="Compute the probability that the selected design is better despite unknown inputs; automatic with the table robust.",
     ),
 ]
 STORE = "Folder of results and of the store of finished runs."
 Out = Annotated[Path | None, folder_option(STORE)]
 Save = Annotated[Path | None, folder_option("Write the JSON record to this folder.")]
-Quiet = Annotated[bool, flag("--quiet", "-q", says="Print only the answer, without progress.")]
+Quiet = Annotated[bool, flag("--quiet", "-q", help="Print only the answer, without progress.")]
 Verbose = Annotated[
     bool,
     flag(
         "--verbose",
         "-v",
-        says="Add every confirmed point, chains, the published table, the analysis of variance, all notes in full.",
+        help="Add every confirmed point, chains, the published table, the analysis of variance, all notes in full.",
     ),
 ]
 
@@ -191,8 +191,8 @@ design = command(
     "Print the design: every run, and how well the runs identify the terms of each model.",
     path=StudyPath,
     out=Save,
-    as_csv=Annotated[bool, flag("--csv", says="Print only one CSV table.")],
-    quiet=Annotated[bool, flag("--quiet", "-q", says="Print only actual values.")],
+    as_csv=Annotated[bool, flag("--csv", help="Print only one CSV table.")],
+    quiet=Annotated[bool, flag("--quiet", "-q", help="Print only actual values.")],
     verbose=Annotated[bool, verbose_flag("Add seeds and leverages.")],
 )
 fit = command(
@@ -252,7 +252,7 @@ chain = command(
         Path, typer.Argument(metavar="CHAIN.toml", help="Dimension chain to solve, or several in tables named chain.")
     ],
     out=Save,
-    quiet=Annotated[bool, flag("--quiet", "-q", says="Print only the parts.")],
+    quiet=Annotated[bool, flag("--quiet", "-q", help="Print only the parts.")],
     verbose=Annotated[bool, verbose_flag("Add yields by distribution, quantiles, classes.")],
 )
 uncertainty = command(

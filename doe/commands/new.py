@@ -97,9 +97,9 @@ def new(
         ),
     ] = None,
     tolerances: Annotated[
-        bool, flag("--tolerances", says="Add tolerances of the clearances by ISO 286 grade, and the widest ones.")
+        bool, flag("--tolerances", help="Add tolerances of the clearances by ISO 286 grade, and the widest ones.")
     ] = False,
-    chains: Annotated[bool, flag("--chains", says="Add the dimension chains of the parts.")] = False,
+    chains: Annotated[bool, flag("--chains", help="Add the dimension chains of the parts.")] = False,
     duty: Annotated[
         Path | None,
         valued(

@@ -195,8 +195,8 @@ def run_data(
         points=points,
         values=response,
         standard_errors=np.array(errors, float) if usable else None,
-        replicates=_whole(replicates, len(points)),
-        block=_whole(block, len(points)),
+        replicates=_labels(replicates, len(points)),
+        block=_labels(block, len(points)),
         centre=np.array(np.broadcast_to(centre, points.shape[1]), float),
         step=np.array(np.broadcast_to(step, points.shape[1]), float),
     )
@@ -225,7 +225,7 @@ def check_matrix(name: str, model: str, terms: Terms, matrix: Array) -> None:
         )
 
 
-def _whole(labels: ArrayLike | None, size: int) -> Whole:
+def _labels(labels: ArrayLike | None, size: int) -> Whole:
     if labels is None:
         return np.zeros(size, dtype=np.int64)
     return np.array(np.broadcast_to(labels, size)).astype(np.int64)

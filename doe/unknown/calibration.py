@@ -455,10 +455,10 @@ def judge(match: Matched, names: Sequence[str], seed: int, power: Power | None =
     return Judgement(result, outputs, joint_factor(beyond), residuals, particles)
 
 
-def objections(judgement: Judgement, *, anything: bool, emulated: bool) -> list[str]:
+def objections(judgement: Judgement, *, has_learned: bool, emulated: bool) -> list[str]:
     """Reasons why inputs may not be called calibrated; none where they may.
 
-    ``anything``: whether anything was learned; ``emulated``: whether emulators predict the simulation there."""
+    ``has_learned``: whether anything was learned; ``emulated``: whether emulators predict the simulation there."""
     result, outputs = judgement.trial, judgement.outputs
     sentences = []
     for output in outputs:
@@ -477,7 +477,7 @@ def objections(judgement: Judgement, *, anything: bool, emulated: bool) -> list[
         sentences.append(_width_words(result.width, [output.name for output in outputs]))
     if not result.crps < result.crps_before:
         sentences.append("measured values are predicted no better than before")
-    if not anything:
+    if not has_learned:
         sentences.append("no input or combination of inputs was learned")
     if not emulated:
         sentences.append("emulators do not predict the simulation at the inputs found")

@@ -373,7 +373,7 @@ class Learnt(Record):
     narrow: list[str] = outside_json(default_factory=list)
 
     @property
-    def anything(self) -> bool:
+    def has_learned(self) -> bool:
         """Whether an input or a combination was learned."""
         return any(share >= LEARNED for share in self.learned.values()) or bool(self.combinations)
 

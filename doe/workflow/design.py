@@ -60,11 +60,11 @@ def design_of(study: Study) -> Design:
 def realised(study: Study, coded: Array, reach: float) -> Array:
     """Coded points (n, k) with whole numbers rounded."""
     integer, half = np.array([factor.whole for factor in study.file.factor]), reach * study.step
-    rounded = _whole(study.actual(coded), study.centre, study.centre - half, study.centre + half)
+    rounded = _integers(study.actual(coded), study.centre, study.centre - half, study.centre + half)
     return np.where(integer, study.coded(rounded), coded)
 
 
-def _whole(actual: Array, centre: Array, low: Array, high: Array) -> Array:
+def _integers(actual: Array, centre: Array, low: Array, high: Array) -> Array:
     """The nearest whole numbers, halves outward, that do not lie beyond the ends of the region."""
     nearest = np.where(actual < centre, np.ceil(actual - 0.5), np.floor(actual + 0.5))
     slack = 1e-9 * (high - low)

@@ -205,7 +205,7 @@ def identified(evidence: Evidence) -> Calibration:
     if match.sampled is not None:
         judgement = judge(match, [quantity(name)[0] for name in rig.outputs], evidence.seed, evidence.design.power)
         gained = _learnt(evidence)
-        contradictions += objections(judgement, anything=gained.anything, emulated=match.misfit < MISSED)
+        contradictions += objections(judgement, has_learned=gained.has_learned, emulated=match.misfit < MISSED)
         after = match.cells.mean(evidence.quantiles)
         notes = (*notes, *map(_narrow, gained.narrow))
         taus = np.quantile(match.errors(evidence.points).level, MEDIAN_FIRST, axis=0).T.tolist()

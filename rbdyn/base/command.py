@@ -276,14 +276,14 @@ def print_table(title: str, header: Sequence[str], rows: Sequence[Sequence[str]]
     show([Table(title, header, rows)])
 
 
-def flag(*names: str, says: str, **more: Any) -> Any:
+def flag(*names: str, help: str, **more: Any) -> Any:
     """An option without a value."""
-    return typer.Option(*names, help=says, **more)
+    return typer.Option(*names, help=help, **more)
 
 
-def valued(metavar: str, says: str, default: str | bool, *names: str, **more: Any) -> Any:
+def valued(metavar: str, help: str, default: str | bool, *names: str, **more: Any) -> Any:
     """An option with a value; ``default`` describes the value without the option, True where that is its default."""
-    return typer.Option(*names, metavar=metavar, help=says, show_default=default, **more)
+    return typer.Option(*names, metavar=metavar, help=help, show_default=default, **more)
 
 
 def _without_types(params: list[Any]) -> list[Any]:
@@ -327,14 +327,14 @@ class Program(typer.Typer):
         return super().command(name, cls=cls, **options)
 
 
-def folder_option(says: str, default: str | bool = "none") -> Any:
+def folder_option(help: str, default: str | bool = "none") -> Any:
     """``--out`` of a command that writes a folder."""
-    return valued("DIR", says, default, "--out")
+    return valued("DIR", help, default, "--out")
 
 
-def verbose_flag(says: str) -> Any:
+def verbose_flag(help: str) -> Any:
     """``--verbose`` of a command."""
-    return flag("--verbose", "-v", says=says)
+    return flag("--verbose", "-v", help=help)
 
 
 def _print_version(requested: bool) -> None:
@@ -345,7 +345,7 @@ def _print_version(requested: bool) -> None:
         raise typer.Exit()
 
 
-Version = Annotated[bool, flag("--version", says="Print the version.", callback=_print_version, is_eager=True)]
+Version = Annotated[bool, flag("--version", help="Print the version.", callback=_print_version, is_eager=True)]
 SceneFile = Annotated[Path, typer.Argument(metavar="SCENE.toml", help="Scene file: bearing and operating point.")]
 Set = Annotated[
     list[str] | None, valued("KEY.PATH=VALUE", "Replace a key of the scene file; repeatable.", "none", "--set")
@@ -354,11 +354,11 @@ Turns = Annotated[float | None, valued("N", "Counted shaft turns.", "numerics.tu
 Replicates = Annotated[int | None, valued("N", "Seeded replicates.", "numerics.replicates of the scene")]
 Seed = Annotated[int | None, valued("N", "Seed of all random starts and deviations.", "numerics.seed of the scene")]
 Workers = Annotated[int | None, valued("N", "Number of threads.", "all processors", min=1)]
-Force = Annotated[bool, flag("--force", says="Overwrite files in the folder that this command did not write.")]
+Force = Annotated[bool, flag("--force", help="Overwrite files in the folder that this command did not write.")]
 OutFile = Annotated[Path | None, valued("FILE", "Write to this file.", "standard output", "--out")]
-ForceFile = Annotated[bool, flag("--force", says="Overwrite the file of --out.")]
-Json = Annotated[bool, flag("--json", says="Print only one JSON object.")]
-Quiet = Annotated[bool, flag("--quiet", "-q", says="Print no progress, and only notes of danger.")]
+ForceFile = Annotated[bool, flag("--force", help="Overwrite the file of --out.")]
+Json = Annotated[bool, flag("--json", help="Print only one JSON object.")]
+Quiet = Annotated[bool, flag("--quiet", "-q", help="Print no progress, and only notes of danger.")]
 
 
 # Column in which the comment on a key starts.

@@ -199,10 +199,10 @@ def condensed(notes: Iterable[Note]) -> list[Note]:
     groups: dict[tuple[str, str], list[Note]] = {}
     for note in ranked(notes):
         groups.setdefault((note.code, NUMBER.sub("#", PLACES.sub("", _parted(note)[1]))), []).append(note)
-    return [_one(group) for group in groups.values()]
+    return [_merged(group) for group in groups.values()]
 
 
-def _one(group: list[Note]) -> Note:
+def _merged(group: list[Note]) -> Note:
     subjects = list(dict.fromkeys(_parted(note)[0] for note in group))
     further = f"; likewise {', '.join(subjects[1:])}" if len(subjects) > 1 else ""
     return Note(group[0].code, f"{group[0]}{further}") if further else group[0]

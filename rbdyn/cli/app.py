@@ -225,7 +225,7 @@ def slip_map(
         bool,
         command.flag(
             "--stiffness",
-            says="Map the stiffness of a roller or ball bearing, for rotor dynamics programs such as ROSS.",
+            help="Map the stiffness of a roller or ball bearing, for rotor dynamics programs such as ROSS.",
         ),
     ] = False,
     load_angle: Annotated[
@@ -337,7 +337,7 @@ def show(
     force: command.Force = False,
     turns: Annotated[float | None, command.valued("N", "Counted shaft turns to show.", "all, at most 20")] = None,
     replicate: Annotated[int, typer.Option(metavar="N", help="Number of the replicate, from 1.")] = 1,
-    animate: Annotated[bool, command.flag("--animate", says="Add a film and a page that plays the motion.")] = False,
+    animate: Annotated[bool, command.flag("--animate", help="Add a film and a page that plays the motion.")] = False,
     as_json: command.Json = False,
     quiet: command.Quiet = False,
     verbose: Annotated[bool, command.verbose_flag("Add peaks of the spectra.")] = False,

@@ -29,9 +29,9 @@ FILES = (*EQUILIBRIUM_FILES, *SWEEP_FILES, *STUDY_FILES, *PICTURES, *REPORT_FILE
 VALUES = "start:stop:count or a,b,c"
 
 
-def study_option(metavar: str, says: str) -> Any:
+def study_option(metavar: str, help: str) -> Any:
     """An option that asks for a study instead of the equilibrium."""
-    return valued(metavar, says, "equilibrium only")
+    return valued(metavar, help, "equilibrium only")
 
 
 @result_command(

@@ -324,7 +324,7 @@ def _part(late: float, scene: Scene) -> Scene:
     return with_numerics(short(scene), **counted, replicates=scene.numerics.replicates)
 
 
-def _whole(scene: Scene) -> Scene:
+def _unchanged(scene: Scene) -> Scene:
     return scene
 
 
@@ -351,7 +351,7 @@ def with_temperatures(
         raise RunError(f"{verdict.status}: {verdict.reason}")
     path, temperatures, ends = verdict.path, verdict.temperatures, verdict.ends
     for _ in range(MOST_WHOLE_RUNS if verdict.steady else 1):
-        state = balance.at(temperatures, _resumed if ends else _whole, progress, starts=ends)
+        state = balance.at(temperatures, _resumed if ends else _unchanged, progress, starts=ends)
         ends = ends and state.run.ensemble.ends
         path.append(state)
         temperatures = corrected(state, verdict.slopes)

@@ -37,7 +37,7 @@ BOUNDLESS = 1e12
 Word = Annotated[
     str | None, typer.Argument(metavar="WORD", help="List only the keys with this word in their name or description.")
 ]
-AsSchema = Annotated[bool, flag("--schema", says="Print a JSON Schema, which lets an editor complete TOML.")]
+AsSchema = Annotated[bool, flag("--schema", help="Print a JSON Schema, which lets an editor complete TOML.")]
 # Unit of numbers and lengths in shaft turns, by the end of a key.
 TURNS = {"_per_turn": "per shaft turn", "turns": "shaft turns"}
 

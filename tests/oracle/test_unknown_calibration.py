@@ -407,7 +407,7 @@ def _against(found: Matched, seed: int = 1) -> tuple[list[str], Judgement]:
     """Why a match may not be called calibrated."""
     assert found.sampled is not None
     judgement = judge(found, ["impact", "loss"], seed)
-    return objections(judgement, anything=True, emulated=found.misfit < 2.0), judgement
+    return objections(judgement, has_learned=True, emulated=found.misfit < 2.0), judgement
 
 
 def test_a_sound_rig_is_calibrated_and_held_out_rows_are_predicted() -> None:
@@ -421,7 +421,7 @@ def test_a_sound_rig_is_calibrated_and_held_out_rows_are_predicted() -> None:
     assert [contraction_words(each) for each in taught.learned.values()] == ["learned", "learned", "not seen"]
     particles = Particles.of(found.sampled, found.joint, found.measured)
     against, judgement = _against(found)
-    assert not against and taught.anything
+    assert not against and taught.has_learned
     result = judgement.trial
     assert (
         result.rows == "held out"

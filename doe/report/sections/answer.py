@@ -215,7 +215,7 @@ def _clearances(summary: Summary) -> list[Block]:
         meaning += least_words(summary)
     widest = SENTENCE_END.split(summary.tolerances_sentence or "")
     return [
-        replace(_chosen(summary, inputs), note=meaning),
+        replace(_selected(summary, inputs), note=meaning),
         Paragraph(summary.clearance_class),
         *_temperatures(summary.confirmation),
         Paragraph("" if summary.obstacles.tolerances else summary.tolerances_warning or "", "warning"),
@@ -264,7 +264,7 @@ def _gain_and_share(gain: float | None, share: Share | None) -> str:
     return "" if share is None else f"{gain_text}{share.of_hundred}"
 
 
-def _chosen(summary: Summary, inputs: Sequence[Factor]) -> Table:
+def _selected(summary: Summary, inputs: Sequence[Factor]) -> Table:
     """The pick of each factor with its tolerance, the baseline, both in operation, and the grade of the parts."""
 
     def tolerance(factor: Factor) -> str:

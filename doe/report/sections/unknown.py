@@ -142,7 +142,7 @@ def uncertainty_blocks(uncertainty: Uncertainty) -> list[Block]:
     rows = [(key, *(_share(output.shares.get(key)) for output in outputs)) for key in uncertainty.keys]
     floor = ("an input that does nothing", *(_share(output.floor) for output in outputs))
     header = ("input", *(quantity(output.name)[0] for output in outputs))
-    caption = f"{_what(outputs)} [%], {100.0 * SHARE_LEVEL:.0f} % intervals"
+    caption = f"{_caption(outputs)} [%], {100.0 * SHARE_LEVEL:.0f} % intervals"
     screened = ""
     if uncertainty.screened:
         most = max(uncertainty.screened, key=lambda key: uncertainty.screened[key])
@@ -159,7 +159,7 @@ def uncertainty_blocks(uncertainty: Uncertainty) -> list[Block]:
     return with_notes(uncertainty.notes, answer, judged=False)
 
 
-def _what(outputs: Iterable[OutputRange]) -> str:
+def _caption(outputs: Iterable[OutputRange]) -> str:
     """The caption of the shares."""
     if any(output.shapley for output in outputs):
         return "Share of the variance over all inputs, divided among dependent inputs (Shapley)"

@@ -223,7 +223,7 @@ def _column(text: str) -> int:
     return place - 1
 
 
-def _whole(text: str) -> int:
+def _number_of(text: str) -> int:
     """The whole number of a place or a format; -1 for any other text."""
     return int(text) if text.isdecimal() and len(text) < 8 else -1
 
@@ -281,11 +281,11 @@ def _kind(number: str, code: str | None) -> str:
     """The kind of the format with a number, and a code unless it is one of Excel's own."""
     if number == "0":
         return ""
-    if _whole(number) in DATE_FORMATS:
+    if _number_of(number) in DATE_FORMATS:
         return "date"
     from openpyxl.styles import numbers
 
-    code = numbers.BUILTIN_FORMATS.get(_whole(number), "General") if code is None else code
+    code = numbers.BUILTIN_FORMATS.get(_number_of(number), "General") if code is None else code
     return "span" if numbers.is_timedelta_format(code) else "date" if numbers.is_date_format(code) else ""
 
 
@@ -365,9 +365,9 @@ class _Cells(_Texts):
                 self._ranges.append((corners[0], corners[-1]))
         elif tag == "row":
             number = keys.get("r", str(self._number + 1))
-            if not self._number < _whole(number) <= LAST_ROW:
+            if not self._number < _number_of(number) <= LAST_ROW:
                 raise DamageError(f": row number {one_line(number, LONGEST_NAME)} after {self._number}")
-            self._row, self._number, self._column = [], _whole(number), -1
+            self._row, self._number, self._column = [], _number_of(number), -1
             self._hides = keys.get("hidden") in ("1", "true")
 
     def end(self, tag: str) -> None:
@@ -441,7 +441,7 @@ class _Cells(_Texts):
         """Text of a cell: a number with all its digits, dates as ISO 8601 has them."""
         kind = self._keys.get("t", "n")
         if kind == "s":
-            place = _whole(text.strip())
+            place = _number_of(text.strip())
             if not 0 <= place < len(self.book.shared):
                 raise DamageError(f": shared text of cell {letters(self._column)}{self._number}")
             return self.book.shared[place]
@@ -451,7 +451,7 @@ class _Cells(_Texts):
             return text
         if not NUMBER.fullmatch(text):
             raise DamageError(f": number of cell {letters(self._column)}{self._number}")
-        style, kinds = _whole(self._keys.get("s", "0")), self.book.kinds
+        style, kinds = _number_of(self._keys.get("s", "0")), self.book.kinds
         form = kinds[style] if 0 <= style < len(kinds) else ""
         return _time(float(text), form, self.book.epoch) if form else Exact(_number(text))
 
