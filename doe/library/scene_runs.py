@@ -1,27 +1,60 @@
-"""A table of scenes from Python: ``run`` returns its rows with their figures as a frame, ``run_answer`` also what failed."""
+"""A table of scenes from Python: ``run`` returns its rows with their figures as a frame, ``run_answer`` also what failed.
+
+A person sees how many rows ended, the span of the main figures, and the causes of failures.
+"""
 
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack, nullcontext
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from statistics import median
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from doe.library.answer import Answer, Rows, optional_path, part_given, path_given, registered, texts_given
 from doe.workflow.effort import Effort, Follow
-from rbdyn.base.blocks import Block
+from rbdyn.base.blocks import Block, Column, Paragraph, Sheet, columns_of, with_notes
 from rbdyn.base.faults import InputError
 from rbdyn.base.files import write_json
 from rbdyn.base.folder import output_folder
-from rbdyn.base.words import Notice, counted
+from rbdyn.base.records import Record, shown
+from rbdyn.base.words import Notice, counted, label
 
 if TYPE_CHECKING:
     import pandas as pd
 
+    from doe.running.store import Cause
     from doe.workflow.scene_table import RowRun
 
 RUN_FILES = ("runs.csv", "runs.json")
 # Typical wall time [s] of what is no run.
 STEPS_S = 1.0
+# Rows that a table names of one cause.
+ROWS_NAMED = 8
+# Figures of rollers that every row has and that its screen shows.
+SHOWN = ("impact_force_N", "whirl_deviation_ratio", "power_loss_W", "cage_slip")
+
+
+class Span(Record):
+    """A figure over all rows: the least, the median and the largest value, and the names of the rows with the ends."""
+
+    figure: str = shown("figure", label)
+    low: float = shown("least")
+    low_row: str = shown("in row", text=True)
+    median: float = shown("median")
+    high: float = shown("largest")
+    high_row: str = shown("in row", text=True)
+
+
+CAUSES: "tuple[Column[Cause], ...]" = (
+    Column("cause", text=True),
+    Column("count", "d", "rows", at=lambda cause: len(cause.runs)),
+    Column("names", words="which", at=lambda cause: _names(cause), text=True),
+)
+
+
+def _names(cause: "Cause") -> str:
+    further = len(cause.labels) - ROWS_NAMED
+    return ", ".join([*cause.labels[:ROWS_NAMED], *([f"{further} more"] if further > 0 else [])])
 
 
 @dataclass(frozen=True, repr=False, eq=False, kw_only=True)
@@ -45,15 +78,35 @@ class RunsAnswer(Answer):
     def __getitem__(self, key: str) -> Any:
         return [run.as_dict() for run in self.runs] if key == "rows" else super().__getitem__(key)
 
-    def blocks(self) -> list[Block]:
-        from doe.report.sections.scene_runs import scene_run_blocks
+    @property
+    def causes(self) -> "Sheet[Cause]":
+        """A row a cause of failures."""
+        from doe.workflow.scene_table import causes_of
 
-        return scene_run_blocks(self.runs, self.part, self.record["notes"])
+        return Sheet("Rows that failed", CAUSES, causes_of(self.runs))
+
+    @property
+    def spans(self) -> Sheet[Span]:
+        """A row a main figure over all rows that are done."""
+        from rbdyn.dynamics.figures import FIGURES
+
+        spans = []
+        for name in (figure.key for figure in FIGURES if figure.key in SHOWN):
+            if numbers := [(value, run.row.name) for run in self.runs if (value := run.value(name)) is not None]:
+                (low, low_row), (high, high_row) = min(numbers), max(numbers)
+                spans.append(Span(name, low, low_row, median(value for value, _ in numbers), high, high_row))
+        return Sheet("Results over all rows", columns_of(Span), spans)
+
+    def blocks(self) -> list[Block]:
+        failed = len(self.record["failures"])
+        ended = f"{len(self.runs) - failed} of {counted(len(self.runs), 'row')} done, {failed} failed"
+        gathers = "the same command without --part gathers all parts"
+        further = f"; this is {self.part}, and {gathers}" if self.part else ""
+        tables = [sheet.block for sheet in (self.spans, self.causes) if sheet.rows]
+        return with_notes(self.record["notes"], [Paragraph(f"{ended}{further}"), *tables], judged=False)
 
     def rows(self) -> Mapping[str, Rows]:
-        from doe.report.sections.scene_runs import cause_sheet
-
-        return {"runs": [run.cells for run in self.runs], "failures": cause_sheet(self.runs).records}
+        return {"runs": [run.cells for run in self.runs], "failures": self.causes.records}
 
     def brief(self) -> str:
         failed = len(self.record["failures"])
