@@ -401,22 +401,15 @@ def place_of(study: Problem, point: Array) -> Place:
     return Place(bounds, study.beyond_runs(study.coded(point)))
 
 
-def edge_of(
-    study: Problem,
-    pick: Confirmed,
-    front: Array,
-    searched: Array | None,
-    simulations: Simulations | None,
-    ends: Array | None = None,
-) -> Edge:
-    """Where the pick and the fronts' points (n, k) lie; the change beyond a bound is by ``simulations`` or by the surfaces.
+def edge_of(study: Problem, pick: Confirmed, front: Array, searched: Adaptive | None, simulations: Simulations) -> Edge:
+    """Where the pick and the fronts' points (n, k) lie; the change beyond a bound is by the surfaces.
 
-    ``ends`` (k, 2): ends of the searched region in factor units, where that has grown.
+    After an adaptive search it is simulated, and the region is the one that was searched, which may have grown.
     """
-    ends = study.ends if ends is None else ends
+    ends = study.ends if searched is None else searched.edges
     sides = sides_of(pick.point[None], ends)[0]
     names = [(index, side) for index, side in enumerate(sides.tolist()) if side]
-    gains_beyond = {} if simulations is None else _gains_by_simulation(study, pick, names, simulations)
+    gains_beyond = {} if searched is None else _gains_by_simulation(study, pick, names, simulations)
     outward = {}
     for index, side in names:
         gains, source = gains_beyond.get(index), "simulation"
@@ -428,7 +421,7 @@ def edge_of(
         outward[study.factors[index]] = Outward("upper" if side > 0 else "lower", bound, unit, source, per_unit)
     goals = {response.name: response.goal for response in study.file.response}
     sentences = [bound.sentence(name, goals) for name, bound in outward.items()]
-    far = None if searched is None else float(sides_of(searched, ends).any(axis=1).mean())
+    far = None if searched is None else float(sides_of(searched.front.points, ends).any(axis=1).mean())
     extrapolates, near = study.beyond_runs(study.coded(pick.point)), share_at_edge(study, front)
     return Edge(extrapolates, outward, near, far, _edge_sentence(sentences, extrapolates, near, far))
 

@@ -396,7 +396,7 @@ def run_study(
         searched, unsearched = _searched(study, runs, simulations, clock) if adaptive else (None, [])
         selection = choose(study, surface_front, searched, original, simulations)
         confirmed, pick = selection.confirmed, selection.confirmed["pick"].point
-        edge = _edge(study, selection, searched, simulations)
+        edge = edge_of(study, confirmed["pick"], selection.front.points, searched, simulations)
         clock.lap("confirmation_s")
         robustness = judge(study, pick, simulations) if robust else None
         clock.lap("robust_s", TOLERANCES)
@@ -457,14 +457,6 @@ def _searched(
         return None, [Note("advice", sentence)]
     finally:
         clock.lap("adaptive_s")
-
-
-def _edge(study: Problem, selection: Selection, searched: Adaptive | None, simulations: Simulations) -> Edge:
-    """The edge of the region at the pick; after an adaptive search, the change beyond it is simulated."""
-    pick, front = selection.confirmed["pick"], selection.front.points
-    if searched is None:
-        return edge_of(study, pick, front, None, None)
-    return edge_of(study, pick, front, searched.front.points, simulations, searched.edges)
 
 
 def _tolerances(study: Problem, searched: Adaptive | None, confirmed: Mapping[str, Confirmed]) -> PickTolerances | None:
