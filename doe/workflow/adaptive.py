@@ -20,7 +20,6 @@ from doe.clearance import Simulations
 from doe.duty import Run, scenes_of
 from doe.pareto.front import NOISE_DRAWS, Samples, SimulatedFront, noisy_hypervolume
 from doe.pareto.search import InfeasibleError, hypervolume, non_dominated
-from doe.running.runner import Progress
 from doe.running.store import Failure, grouped
 from doe.workflow.confirmation import Limit
 from doe.workflow.front import named_faults
@@ -55,14 +54,14 @@ class Adaptive:
 
 
 class Evaluator:
-    """Runs batches of scenes on the simulator, each with its own seed: a running number.
+    """Runs batches of points, each with its number of replicates and its own seed: a running number.
 
-    A repeated search asks for the same runs in the same order, and the store answers at once.
+    A repeated search asks for the same runs in the same order, and the store answers at once. The bar shows the state of the search.
     """
 
-    def __init__(self, study: Problem, simulations: Simulations, progress: Progress, total: int) -> None:
+    def __init__(self, study: Problem, simulations: Simulations, total: int, title: str = "adaptive front") -> None:
         self._study, self._simulations = study, simulations
-        self._progress, self._total = progress, total
+        self._progress, self._total = simulations.progress(title), total
         self.done = 0
         self.failures: list[Failure] = []
 
@@ -83,6 +82,21 @@ class Evaluator:
     def _watch(self, count: int, total: int) -> None:
         points = max(len(self._study.shares), 1)
         self._progress(points * self.done + count, max(points * self._total, points * self.done + total))
+
+    def report(self, state: Batch, count: int, total: int) -> None:
+        """A new bar for each batch."""
+        gain_percent = 100.0 * state.remaining / max(state.hypervolume, 1e-300)
+        words = f"adaptive front: hypervolume {state.hypervolume:.3f}, about {gain_percent:.1f} % to gain"
+        self._progress = self._simulations.progress(words)
+
+    def __call__(self, points: Array, replicates: Whole) -> tuple[Array, Array, Whole]:
+        """Responses (n, m), their standard errors (n, m) and the degrees of freedom (n, m) of these."""
+        # Points at the resolution of the drawing, whatever their last bits were.
+        scenes = []
+        for number, (point, count) in enumerate(zip(points, replicates.tolist(), strict=True), self.done):
+            scenes += self._study.adaptive_scenes(self._study.rounded(point)[None], [count], number)
+        values, errors, samples = self.run(scenes, "adaptive run")
+        return values, standard_errors(errors, samples), np.maximum(samples - 1, 0)
 
 
 def check_adaptive(study: Problem) -> None:
@@ -110,7 +124,7 @@ def find_adaptive(study: Problem, runs: Runs, simulations: Simulations) -> Adapt
     """
     plan, goals, start_s = plan_of(study), study.goals, time.perf_counter()
     first_runs = _design_runs(study, runs)
-    evaluator = _PointEvaluator(study, simulations, plan.budget - len(first_runs.points))
+    evaluator = Evaluator(study, simulations, plan.budget - len(first_runs.points))
     region, step, border = region_in_units(study), study.half_ranges, border_of(study)
     with named_faults(study, goals, lambda point: point, ""):
         try:
@@ -202,28 +216,6 @@ def advice(study: Problem) -> list[str]:
         f"the predicted front is biased by lack of fit in {where}. Use --adaptive "
         f"({counted(max(study.file.adaptive.budget - design, 0), 'more run')})"
     ]
-
-
-class _PointEvaluator(Evaluator):
-    """Runs batches of points, each with its number of replicates; the bar shows the state of the search."""
-
-    def __init__(self, study: Problem, simulations: Simulations, total: int) -> None:
-        super().__init__(study, simulations, simulations.progress("adaptive front"), total)
-
-    def report(self, state: Batch, count: int, total: int) -> None:
-        """A new bar for each batch."""
-        gain_percent = 100.0 * state.remaining / max(state.hypervolume, 1e-300)
-        words = f"adaptive front: hypervolume {state.hypervolume:.3f}, about {gain_percent:.1f} % to gain"
-        self._progress = self._simulations.progress(words)
-
-    def __call__(self, points: Array, replicates: Whole) -> tuple[Array, Array, Whole]:
-        """Responses (n, m), their standard errors (n, m) and the degrees of freedom (n, m) of these."""
-        # Points at the resolution of the drawing, whatever their last bits were.
-        scenes = []
-        for number, (point, count) in enumerate(zip(points, replicates.tolist(), strict=True), self.done):
-            scenes += self._study.adaptive_scenes(self._study.rounded(point)[None], [count], number)
-        values, errors, samples = self.run(scenes, "adaptive run")
-        return values, standard_errors(errors, samples), np.maximum(samples - 1, 0)
 
 
 def _design_runs(study: Problem, runs: Runs) -> SearchRuns:

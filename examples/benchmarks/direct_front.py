@@ -30,7 +30,6 @@ from doe.clearance import Simulations
 from doe.pareto import ParetoFront
 from doe.pareto.front import SimulatedFront
 from doe.pareto.search import spread
-from doe.running.runner import Progress
 from doe.running.store import STORE, Failure, Store, grouped
 from doe.workflow.adaptive import Evaluator
 from doe.workflow.effort import Effort
@@ -127,8 +126,8 @@ def run_in_words(study: Problem, settings: Settings) -> str:
 class Generations(Evaluator):
     """Runs generations of points, every row with a seed of its own."""
 
-    def __init__(self, study: Problem, settings: Settings, simulations: Simulations, progress: Progress) -> None:
-        super().__init__(study, simulations, progress, settings.evaluations)
+    def __init__(self, study: Problem, settings: Settings, simulations: Simulations) -> None:
+        super().__init__(study, simulations, settings.evaluations, "direct front")
         self._settings = settings
 
     def __call__(self, points: Array) -> tuple[Array, Array]:
@@ -144,7 +143,7 @@ def find_direct(study: Problem, settings: Settings, on_surfaces: ParetoFront, si
     """
     check(study, settings)
     reach = study.reach
-    evaluate = Generations(study, settings, simulations, simulations.progress("direct front"))
+    evaluate = Generations(study, settings, simulations)
     started = time.perf_counter()
     try:
         front = direct_front(

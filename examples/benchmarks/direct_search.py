@@ -13,22 +13,11 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.stats import norm
 
 from doe.pareto.front import NOISE_DRAWS, Samples, SimulatedFront, noisy_hypervolume
-from doe.pareto.search import (
-    NAMES,
-    Goals,
-    Rule,
-    check_search,
-    dominance,
-    error_aware_dominance,
-    non_dominated,
-    order,
-    pick_all,
-    ranks,
-    spread,
-)
-from rbdyn.base.arrays import Array, Rows
+from doe.pareto.search import NAMES, Goals, Rule, check_search, dominates, non_dominated, pick_all, spread
+from rbdyn.base.arrays import Array, Mask, Rows
 from rbdyn.base.faults import MethodError
 from rbdyn.base.words import signed_with_error
 
@@ -298,3 +287,46 @@ def compare_with_surrogate(
         loss_percent=None if ratio is None else 100.0 * (1.0 - ratio),
         loss_error_percent=error,
     )
+
+
+def dominance(costs: Array) -> Mask:
+    """Whether row i of ``costs`` (n, q) dominates row j, (n, n), without regard to errors."""
+    return dominates(costs[:, None], costs[None, :])
+
+
+def error_aware_dominance(costs: Array, errors: Array, confidence: float) -> Mask:
+    """Whether mean i dominates mean j beyond their errors: (n, n).
+
+    Row i of ``costs`` (n, q) must be below row j in every cost. The least difference is the one-sided normal quantile of
+    ``confidence`` times the combined standard error of both, ``errors`` (n, q).
+    """
+    difference = costs[None, :] - costs[:, None]
+    combined = np.sqrt(errors[None, :] ** 2 + errors[:, None] ** 2)
+    return (difference > norm.ppf(confidence) * combined).all(axis=-1)
+
+
+def ranks(dominating: Mask) -> Rows:
+    """Front number (n,) of each row: 0 for non-dominated rows, 1 for rows that only those dominate, and so on."""
+    rank = np.full(len(dominating), -1, dtype=np.intp)
+    dominators = dominating.sum(axis=0)
+    level = 0
+    while (rank < 0).any():
+        front = (dominators == 0) & (rank < 0)
+        if not front.any():
+            # With errors, dominance may be circular; all rows of a circle share a front.
+            front = rank < 0
+        rank[front] = level
+        dominators = dominators - dominating[front].sum(axis=0)
+        level += 1
+    return rank
+
+
+def order(costs: Array, errors: Array, confidence: float) -> Rows:
+    """Place (n,) of each row by its front beyond errors, and within that by its front without errors."""
+    outer = ranks(error_aware_dominance(costs, errors, confidence))
+    inner = np.empty_like(outer)
+    for level in np.unique(outer):
+        rows = np.flatnonzero(outer == level)
+        inner[rows] = ranks(dominance(costs[rows]))
+    _, places = np.unique(np.column_stack([outer, inner]), axis=0, return_inverse=True)
+    return places.reshape(-1)

@@ -4,12 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from direct_search import compare_with_surrogate, direct_front
+from direct_search import compare_with_surrogate, direct_front, dominance, error_aware_dominance, order, ranks
 from pareto_cases import LOWER, UPPER, bowls, noisy_bowls
 
 from doe.pareto import Goals, front, hypervolume
 from doe.pareto.front import noisy_hypervolume
-from doe.pareto.search import dominance, error_aware_dominance, order, ranks
 
 GOALS = Goals.of(["min", "min"])
 BUDGET = {"evaluations": 800, "population": 40, "baseline": [0.7, 0.4, 0.1]}
