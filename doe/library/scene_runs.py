@@ -165,10 +165,8 @@ def run_answer(
 
     content: Any = table if hasattr(table, "columns") else path_given(table, "table")
     base, target = optional_path(scene, "scene"), optional_path(out, "out")
-    assignments, effort = (
-        texts_given(overrides, "overrides", '["cage.mass_g=50"]'),
-        Effort(workers, scheduler, retry, progress, notice),
-    )
+    assignments = texts_given(overrides, "overrides", '["cage.mass_g=50"]')
+    effort = Effort(workers, scheduler, retry, progress, notice)
     share = part_given(part)
     if share is not None and target is None:
         raise InputError([f"--part {part}: needs --out DIR, the folder that all parts share"])

@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from doe.workflow.parts import Made
     from doe.workflow.tolerances import FactorTolerance
     from doe.workflow.uncertainty import Uncertainty
-    from rbdyn.base.blocks import Sheet
 
 
 # Patterns of the names of all files of a study.
@@ -283,12 +282,12 @@ class UncertaintyAnswer(Answer):
         from doe.report.sections.unknown import input_sheet, range_sheet, set_rows, share_sheet
 
         outputs = self.uncertainty.responses.values()
-        sheets: dict[str, Sheet[Any]] = {
-            "ranges": range_sheet(outputs),
-            "shares": share_sheet(outputs),
-            "inputs": input_sheet(self.uncertainty.inputs),
+        return {
+            "ranges": range_sheet(outputs).records,
+            "shares": share_sheet(outputs).records,
+            "inputs": input_sheet(self.uncertainty.inputs).records,
+            "sets": set_rows(self.uncertainty),
         }
-        return {name: sheet.records for name, sheet in sheets.items()} | {"sets": set_rows(self.uncertainty)}
 
     def brief(self) -> str:
         ranges = []
@@ -385,12 +384,11 @@ class CalibrationAnswer(Answer):
     def rows(self) -> Mapping[str, Rows]:
         from doe.report.sections.calibration import input_sheet, measured_sheet, output_sheet
 
-        sheets: dict[str, Sheet[Any]] = {
-            "inputs": input_sheet(self.calibration),
-            "outputs": output_sheet(self.calibration),
-            "cells": measured_sheet(self.calibration),
+        return {
+            "inputs": input_sheet(self.calibration).records,
+            "outputs": output_sheet(self.calibration).records,
+            "cells": measured_sheet(self.calibration).records,
         }
-        return {name: sheet.records for name, sheet in sheets.items()}
 
     def brief(self) -> str:
         from doe.report.sections.calibration import verdict_words

@@ -253,10 +253,8 @@ def confirmation_sheet(
         for name, point in points.items()
         for response, value in point.responses.items()
     ]
-    mean, its_gain = (
-        "mean, and half widths of the 95 % intervals",
-        "gain on the baseline, positive where better, and its half width",
-    )
+    mean = "mean, and half widths of the 95 % intervals"
+    its_gain = "gain on the baseline, positive where better, and its half width"
     columns: tuple[Column[Row], ...] = (
         Column("point", meaning="baseline, pick (the selected design), or the rule that chose the point"),
         *Column[Row]("{}", unit="of the name", meaning="the point").of(factors),

@@ -296,12 +296,8 @@ def _heat(study: Problem, balance: Balances) -> tuple[dict[str, list[Temperature
 
     Raises RunError where the bearing has no steady temperatures even with wider clearances.
     """
-    scenes, heat, causes, near = (
-        _scenes(study, study.centre, kind=DrawnScene),
-        dict[str, list[Temperatures]](),
-        dict[str, str](),
-        dict[str, Near](),
-    )
+    scenes = _scenes(study, study.centre, kind=DrawnScene)
+    heat, causes, near = dict[str, list[Temperatures]](), dict[str, str](), dict[str, Near]()
     if all(scene.thermal is None for scene in scenes.values()):
         return {}, [], {}
     for kelvins in WIDER_K:

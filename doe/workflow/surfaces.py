@@ -314,10 +314,8 @@ def drawn_responses(
     links = [link_of(surface) for surface in surfaces]
     correlation_root = _root(residual_correlation(surfaces))
     places_of_runs = _places(surfaces)
-    runs, most_freedom = (
-        1 + max(map(max, places_of_runs)),
-        max(max(surface.residual_dof, surface.interval_dof) for surface in surfaces),
-    )
+    runs = 1 + max(map(max, places_of_runs))
+    most_freedom = max(max(surface.residual_dof, surface.interval_dof) for surface in surfaces)
     for first in range(0, draws, CHUNK):
         count = min(CHUNK, draws - first)
         squares = np.cumsum(
