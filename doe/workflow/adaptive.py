@@ -126,7 +126,7 @@ def find_adaptive(study: Problem, runs: Runs, simulations: Simulations) -> Adapt
     first_runs = _design_runs(study, runs)
     evaluator = Evaluator(study, simulations, plan.budget - len(first_runs.points))
     region, step, border = region_in_units(study), study.half_ranges, border_of(study)
-    with named_faults(study, goals, lambda point: point, ""):
+    with named_faults(study, lambda point: point, ""):
         try:
             search = AdaptiveSearch(
                 evaluator, study.centre, step, region, first_runs, goals, plan, study.baseline, evaluator.report, border

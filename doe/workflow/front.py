@@ -13,7 +13,7 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 from scipy import special
 
-from doe.pareto import Goals, InfeasibleError, ParetoFront, front
+from doe.pareto import InfeasibleError, ParetoFront, front
 from doe.pareto.front import FrontUncertainty, front_uncertainty
 from doe.pareto.manufacture import (
     SURVIVAL_PARTS,
@@ -72,7 +72,7 @@ def find_front(study: Problem, simulated: Sequence[Confirmed] = (), failed: int 
             barred=None if remaining is None else lambda points: remaining.excess(study.coded(points)),
         )
 
-    with named_faults(study, goals, lambda point: point, ""):
+    with named_faults(study, lambda point: point, ""):
         try:
             pareto = _backed_off(study, lambda share: plain(doubt.at_share(share)), failed)
         except InfeasibleError:
@@ -82,7 +82,7 @@ def find_front(study: Problem, simulated: Sequence[Confirmed] = (), failed: int 
     pareto = replace(pareto, uncertainty=_uncertainty(study, pareto))
     if box is None or pareto.violations is not None:
         return pareto
-    with named_faults(study, goals, study.actual, " after manufacture"):
+    with named_faults(study, study.actual, " after manufacture"):
         try:
             aware = _backed_off(
                 study, lambda share: _tolerance_aware(study, pareto, box, doubt.at_share(share)), failed
@@ -154,7 +154,7 @@ def _tolerance_aware(study: Problem, pareto: ParetoFront, box: ToleranceBox, dou
 
 
 @contextmanager
-def named_faults(study: Problem, goals: Goals, actual: Callable[[Array], Array], suffix: str) -> Iterator[None]:
+def named_faults(study: Problem, actual: Callable[[Array], Array], suffix: str) -> Iterator[None]:
     """Raises OutOfReachError for a search without a feasible point; ``actual`` gives points in factor units."""
     try:
         yield

@@ -132,7 +132,7 @@ def _keys_and_outputs(sheet: InputTable) -> tuple[tuple[str, ...], tuple[str, ..
     outputs = tuple(name for name in names if name in OUTPUTS)
     columns = {*keys, *outputs, *(name + end for name in outputs for end in (SD, ACCURACY)), TURNS, HOLD}
     faults = [f"{sheet.path}: {fault}" for fault in unknown_keys(keys)]
-    faults += [f"{sheet.path}: {_unknown(name, outputs)}" for name in names if name not in columns]
+    faults += [f"{sheet.path}: {_unknown(name)}" for name in names if name not in columns]
     if not outputs:
         faults.append(f"{sheet.path}: no measured output; add a column of {listed(OUTPUTS)}")
     if not keys:
@@ -143,7 +143,7 @@ def _keys_and_outputs(sheet: InputTable) -> tuple[tuple[str, ...], tuple[str, ..
     return keys, outputs
 
 
-def _unknown(name: str, outputs: Sequence[str]) -> str:
+def _unknown(name: str) -> str:
     for end in (SD, ACCURACY):
         if name.endswith(end):
             output = listed([name.removesuffix(end)])
