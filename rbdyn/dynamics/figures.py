@@ -11,38 +11,13 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
+from rbdyn import losses
 from rbdyn.base.arrays import Array
 from rbdyn.base.words import quantity
 from rbdyn.clearances import REPORTED
-from rbdyn.dynamics.forces.state import (
-    ENTRY_ENERGIES,
-    ENTRY_SLIPS,
-    EXPONENTS,
-    INNER_DENSITIES,
-    INNER_FLASHES,
-    NUMBER,
-    OUTER_DENSITIES,
-    OUTER_FLASHES,
-    PEAK_POWERS,
-    POCKET_CONTACT_LOAD,
-    POCKET_LOAD,
-    SAMPLE_LOWEST,
-    SAMPLE_STEPS,
-    SAMPLES_NUMBER,
-    SAMPLES_TOTAL,
-    SQUARES,
-)
+from rbdyn.dynamics.forces import state
 from rbdyn.dynamics.statistics.extremes import FEWEST_WINDOWS, RETURN_FORCE, RETURN_WINDOWS, is_fitted, least_windows
 from rbdyn.dynamics.statistics.replicate import Replicate, Statistic, mean, timed, windowed
-from rbdyn.losses import (
-    LAND_FRICTION,
-    POCKET_DAMPING,
-    POCKET_FORCE,
-    POCKET_FRICTION,
-    POCKET_SQUEEZE,
-    POWER_TERMS,
-    SHAFT,
-)
 from rbdyn.result import START_FIGURES, TEMPERATURES
 from rbdyn.scene.laws import SLOWEST_CAGE
 
@@ -137,9 +112,9 @@ def orbit(run: Replicate) -> Array:
     return np.column_stack((samples, np.maximum(about, 0.0)))
 
 
-IMPACT_FORCE = windowed(POCKET_LOAD)
+IMPACT_FORCE = windowed(state.POCKET_LOAD)
 WHIRL_DEVIATION_RATIO = Statistic(lambda run: run.whirl[run.first :], deviation_ratio)
-POWER_LOSS = timed(lambda run: run.work[:, :SHAFT].sum(axis=1))
+POWER_LOSS = timed(lambda run: run.work[:, : losses.SHAFT].sum(axis=1))
 CAGE_SPEED = timed(lambda run: run.cage_angle)
 CAGE_SLIP = timed(lambda run: np.column_stack((run.kinematic_angle, run.cage_angle)), slip)
 # Root mean square distance of the cage's centre from its mean place in a replicate [m].
@@ -166,7 +141,7 @@ BEARING = (
     Figure(
         "impact_contact_force_N",
         "impact force by contact alone, without the oil film of the pocket",
-        windowed(POCKET_CONTACT_LOAD),
+        windowed(state.POCKET_CONTACT_LOAD),
         tested=True,
         words="largest of it by contact alone, without the film [N]",
         repeats="impact_force_N",
@@ -239,10 +214,10 @@ def _pocket_track(run: Replicate) -> Array:
     return np.column_stack(
         (
             durations,
-            work[:, POCKET_FRICTION],
+            work[:, losses.POCKET_FRICTION],
             orbit[:, 0],
             orbit[:, 3],
-            work[:, POCKET_FORCE],
+            work[:, losses.POCKET_FORCE],
             run.pocket_width * durations,
         )
     )
@@ -275,14 +250,14 @@ def quantile(sums: Array) -> Array:
     place = np.argmax(shares >= SAMPLE_QUANTILE - 1e-12, axis=-1)[..., None]
     step = np.maximum(np.take_along_axis(counts, place, -1) / np.maximum(sums[..., :1], 1.0), 1e-300)
     inside = 1.0 - (np.take_along_axis(shares, place, -1) - SAMPLE_QUANTILE) / step
-    values = SAMPLE_LOWEST * 10.0 ** ((place + np.clip(inside, 0.0, 1.0)) / SAMPLE_STEPS)
+    values = state.SAMPLE_LOWEST * 10.0 ** ((place + np.clip(inside, 0.0, 1.0)) / state.SAMPLE_STEPS)
     # The first step holds all that is smaller.
     return np.where((sums[..., 0] > 0.5) & (place[..., 0] > 0), values[..., 0], 0.0)
 
 
 def _sampled(place: int, key: str, meaning: str, unit: str, level: bool, scale: float = 1.0) -> "Figure":
     """The mean of a sampled quantity, or the value that 95 % of its samples stay below."""
-    columns = [SAMPLES_NUMBER, SAMPLES_TOTAL]
+    columns = [state.SAMPLES_NUMBER, state.SAMPLES_TOTAL]
 
     def moments(run: Replicate) -> Array:
         sums = run.races[run.first :, place]
@@ -297,7 +272,9 @@ def _sampled(place: int, key: str, meaning: str, unit: str, level: bool, scale: 
         kind="damage",
         words=f"{meaning} [{unit}]",
         switch="damage.races",
-        is_defined=lambda runs: any(bool(run.races[run.first :, place:, SAMPLES_NUMBER][:, :1].any()) for run in runs),
+        is_defined=lambda runs: any(
+            bool(run.races[run.first :, place:, state.SAMPLES_NUMBER][:, :1].any()) for run in runs
+        ),
     )
 
 
@@ -321,7 +298,7 @@ def _half_impact_mass(scene: "Scene") -> float:
 
 
 def _any_impacts(runs: Sequence[Replicate]) -> bool:
-    return any(bool(_impacts(run)[:, NUMBER].any()) for run in runs)
+    return any(bool(_impacts(run)[:, state.NUMBER].any()) for run in runs)
 
 
 def _pocket_length(scene: "Scene") -> float:
@@ -340,7 +317,7 @@ CAGE_DAMAGE = (
     Figure(
         "pocket_sliding_N_m_s",
         "contact force of a pocket times the speed at which its roller slides on it, mean over time and pockets",
-        timed(partial(_work, POCKET_FRICTION)),
+        timed(partial(_work, losses.POCKET_FRICTION)),
         _pocket_sliding,
         kind="damage",
         words="force times sliding speed in a pocket [N m/s]",
@@ -359,7 +336,7 @@ CAGE_DAMAGE = (
     Figure(
         "land_sliding_N_m_s",
         "contact force of the guide land times the speed at which the cage slides on it, mean over time",
-        timed(partial(_work, LAND_FRICTION)),
+        timed(partial(_work, losses.LAND_FRICTION)),
         _land_sliding,
         kind="damage",
         words="force times sliding speed on the land [N m/s]",
@@ -368,7 +345,7 @@ CAGE_DAMAGE = (
     Figure(
         "pocket_force_mean_N",
         "force on a pocket, mean over time and pockets; with films that on its more loaded wall",
-        timed(partial(_work, POCKET_FORCE)),
+        timed(partial(_work, losses.POCKET_FORCE)),
         _with_pockets(lambda scene: 1.0 / scene.bearing.rollers),
         kind="damage",
         words="mean force on a pocket [N]",
@@ -377,7 +354,7 @@ CAGE_DAMAGE = (
     Figure(
         "pocket_impact_power_W",
         "power that impacts lose in all pockets: by damping of the walls and by squeezing films",
-        timed(lambda run: run.work[:, POCKET_DAMPING] + run.work[:, POCKET_SQUEEZE]),
+        timed(lambda run: run.work[:, losses.POCKET_DAMPING] + run.work[:, losses.POCKET_SQUEEZE]),
         _with_pockets(lambda scene: 1.0),
         kind="damage",
         words="power that impacts lose in all pockets [W]",
@@ -386,7 +363,7 @@ CAGE_DAMAGE = (
     Figure(
         "impacts_per_turn",
         "contacts of rollers and pocket walls in a shaft turn whose first approach exceeds damage.impact_speed_m_s",
-        timed(lambda run: run.impacts[:, :, NUMBER].sum(axis=1)),
+        timed(lambda run: run.impacts[:, :, state.NUMBER].sum(axis=1)),
         _with_pockets(lambda scene: scene.turn_s),
         kind="damage",
         words="impacts in all pockets in a shaft turn",
@@ -396,7 +373,7 @@ CAGE_DAMAGE = (
     Figure(
         "impact_energy_J",
         "energy that roller and free cage bring into an impact by their first approach, mean over impacts",
-        Statistic(lambda run: _impacts(run)[:, [NUMBER, SQUARES]], _mean_or_none),
+        Statistic(lambda run: _impacts(run)[:, [state.NUMBER, state.SQUARES]], _mean_or_none),
         _with_pockets(_half_impact_mass),
         kind="damage",
         words="energy of an impact, mean [J]",
@@ -407,7 +384,7 @@ CAGE_DAMAGE = (
     Figure(
         "impact_fatigue_force_N",
         "equal peak force of all impacts that tires a bar as they do, by the exponent damage.fatigue_exponent",
-        Statistic(lambda run: _impacts(run)[:, [NUMBER, PEAK_POWERS, EXPONENTS]], fatigue_force),
+        Statistic(lambda run: _impacts(run)[:, [state.NUMBER, state.PEAK_POWERS, state.EXPONENTS]], fatigue_force),
         _with_pockets(lambda scene: 1.0),
         kind="damage",
         words="equal peak force of impacts, for fatigue [N]",
@@ -444,15 +421,15 @@ RACE_DAMAGE = (
     *(
         _sampled(place, f"{race}_{key}", f"{words} of {race} raceway, 95 % below", unit, True, scale)
         for key, words, unit, scale, places in (
-            ("power_density_W_mm2", "power density", "W/mm2", 1e-6, (INNER_DENSITIES, OUTER_DENSITIES)),
-            ("flash_rise_K", "flash rise", "K", 1.0, (INNER_FLASHES, OUTER_FLASHES)),
+            ("power_density_W_mm2", "power density", "W/mm2", 1e-6, (state.INNER_DENSITIES, state.OUTER_DENSITIES)),
+            ("flash_rise_K", "flash rise", "K", 1.0, (state.INNER_FLASHES, state.OUTER_FLASHES)),
         )
         for race, place in zip(("inner", "outer"), places, strict=True)
     ),
-    _sampled(ENTRY_SLIPS, "entry_slip_m_s", "slip of a roller at its entry, mean", "m/s", False),
-    _sampled(ENTRY_SLIPS, "entry_slip_95_m_s", "slip at its entry, 95 % below", "m/s", True),
-    _sampled(ENTRY_ENERGIES, "entry_energy_J", "friction energy of its entry, mean", "J", False),
-    _sampled(ENTRY_ENERGIES, "entry_energy_95_J", "friction energy of it, 95 % below", "J", True),
+    _sampled(state.ENTRY_SLIPS, "entry_slip_m_s", "slip of a roller at its entry, mean", "m/s", False),
+    _sampled(state.ENTRY_SLIPS, "entry_slip_95_m_s", "slip at its entry, 95 % below", "m/s", True),
+    _sampled(state.ENTRY_ENERGIES, "entry_energy_J", "friction energy of its entry, mean", "J", False),
+    _sampled(state.ENTRY_ENERGIES, "entry_energy_95_J", "friction energy of it, 95 % below", "J", True),
 )
 DAMAGE = (*CAGE_DAMAGE, *RACE_DAMAGE)
 
@@ -530,7 +507,7 @@ PARTS = (
             kind="power",
             source=(loss,),
         )
-        for place, loss in enumerate(POWER_TERMS)
+        for place, loss in enumerate(losses.POWER_TERMS)
     ),
     *(
         Figure(

@@ -23,17 +23,7 @@ from rbdyn.base.words import Notice
 from rbdyn.dynamics.ensemble import Outcome, Pace, Reporter, Stop, in_turn, run_all, threads_of
 from rbdyn.dynamics.forces.equations import RollerBearing, mechanical_energy
 from rbdyn.dynamics.forces.state import CAGE_ANGLE, CAGE_X
-from rbdyn.dynamics.integrators.advance import (
-    ACCEPTED,
-    DERIVATIVES,
-    PLACE_SQUARES,
-    PLACES_X,
-    PLACES_Y,
-    REJECTED,
-    SAMPLES,
-    SPEEDS,
-    SQUARES,
-)
+from rbdyn.dynamics.integrators import advance
 from rbdyn.dynamics.parameters.model import pocket_width
 from rbdyn.dynamics.parameters.state import group_of, scales
 from rbdyn.dynamics.run import Run, with_numerics
@@ -44,7 +34,10 @@ from rbdyn.scene import Scene
 from rbdyn.scene.laws import MOST_OF_A_RUN, MOST_SAMPLES
 
 # Columns of the whirl of a tally that become ``whirl`` and ``orbit`` of a replicate.
-SPEED_SUMS, PLACE_SUMS = (SAMPLES, SPEEDS, SQUARES), (SAMPLES, PLACES_X, PLACES_Y, PLACE_SQUARES)
+SPEED_SUMS, PLACE_SUMS = (
+    (advance.SAMPLES, advance.SPEEDS, advance.SQUARES),
+    (advance.SAMPLES, advance.PLACES_X, advance.PLACES_Y, advance.PLACE_SQUARES),
+)
 # Long enough that the step cut at the end of a batch costs nothing, short compared with any memory that matters.
 BATCH_TURNS = 1.0
 
@@ -169,9 +162,9 @@ class Recording:
             kinematic_angle=np.diff(rolling),
             energy=energy,
             energy_scale=scale.load * scale.length,
-            accepted_steps=int(run.carry.counts[ACCEPTED]),
-            rejected_steps=int(run.carry.counts[REJECTED]),
-            derivatives=int(run.carry.counts[DERIVATIVES]),
+            accepted_steps=int(run.carry.counts[advance.ACCEPTED]),
+            rejected_steps=int(run.carry.counts[advance.REJECTED]),
+            derivatives=int(run.carry.counts[advance.DERIVATIVES]),
             cpu_s=self._cpu_s,
             method=run.method,
             stiffness=run.carry.stiffness.copy(),

@@ -20,30 +20,7 @@ from rbdyn.dynamics.forces.cage import Impacts
 from rbdyn.dynamics.forces.equations import RollerBearing, mechanical_energy
 from rbdyn.dynamics.forces.race_samples import RaceSamples
 from rbdyn.dynamics.forces.state import CAGE_X, INNER_ANGLE, OUTER_ANGLE, RING_X, name
-from rbdyn.dynamics.integrators.advance import (
-    ACCEPTED,
-    DERIVATIVES,
-    EIGENVALUES,
-    FINISHED,
-    LIMITED,
-    NOW,
-    REJECTED,
-    SAMPLE,
-    STEP,
-    STEP_BUDGET,
-    STIFFNESS,
-    TESTED,
-    TRACED,
-    WORST,
-    Carry,
-    Control,
-    Status,
-    Tally,
-    advance,
-    carry_from,
-    empty_tally,
-    trace_of,
-)
+from rbdyn.dynamics.integrators import advance
 from rbdyn.dynamics.integrators.runge_kutta import DormandPrince, Kutta
 from rbdyn.dynamics.parameters.state import absolute_tolerance, increments, layout_of, scales, start_state, wall_of
 from rbdyn.dynamics.statistics.replicate import Replicate
@@ -86,8 +63,10 @@ class Run:
         self.explicit = explicit_method(numerics.method, numerics.rtol)
         first_method = self.explicit if self.method == "auto" else self.method
         first_step = 1e-3 * scales(scene).length / scales(scene).speed
-        self.carry = carry_from(begin.copy(), bearing.rollers, first_step, method_of(first_method, scene, bearing))
-        self.tally = empty_tally(
+        self.carry = advance.carry_from(
+            begin.copy(), bearing.rollers, first_step, method_of(first_method, scene, bearing)
+        )
+        self.tally = advance.empty_tally(
             bearing.rollers, isinstance(bearing.impacts, Impacts), isinstance(bearing.samples, RaceSamples)
         )
         self.sample_step = scene.turn_s / numerics.samples_per_turn
@@ -104,8 +83,8 @@ class Run:
         elif self.layout.support is not None:
             bodies.append(self.layout.support)
         components = [place for body in bodies for place in (body, body + 1)]
-        self.carry = self.carry._replace(trace=trace_of(components, spacing, room))
-        self.carry.clock[TRACED] = self.carry.clock[NOW]
+        self.carry = self.carry._replace(trace=advance.trace_of(components, spacing, room))
+        self.carry.clock[advance.TRACED] = self.carry.clock[advance.NOW]
 
     def choose_method(self) -> None:
         """Replace "auto" by the cheaper method in a trial from where the run is; the run itself does not change."""
@@ -119,10 +98,10 @@ class Run:
             self.carry = self.carry._replace(method=method_of(self.method, self.scene, self.bearing))
             self.control = self._control_by(self.method)._replace(step_budget=self.control.step_budget)
 
-    def _control_by(self, method: str) -> Control:
+    def _control_by(self, method: str) -> advance.Control:
         numerics = self.scene.numerics
         turns = numerics.turns + numerics.warm_up_turns
-        return Control(
+        return advance.Control(
             1.0 / absolute_tolerance(self.scene, self.bearing, self.rtol, method),
             SMALLEST_STEP_TURNS * self.scene.turn_s,
             min(LARGEST_STEP_TURNS * self.scene.turn_s, self.longest_step),
@@ -144,41 +123,41 @@ class Run:
         while True:
             self.stop.check()
             control = self.control._replace(step_budget=min(self.steps + STEPS_AT_ONCE, budget))
-            code = advance(self.bearing, control, self.carry, self.tally, end, self.sample_step)
-            status = list(Status)[code]
+            code = advance.advance(self.bearing, control, self.carry, self.tally, end, self.sample_step)
+            status = list(advance.Status)[code]
             self.spent_s = time.perf_counter() - started
             if self.pace is not None:
-                turned = float(self.carry.clock[NOW]) / self.scene.turn_s
+                turned = float(self.carry.clock[advance.NOW]) / self.scene.turn_s
                 self.pace.look(self.ticket, self.spent_s, turned)
-            if status is Status.FINISHED:
+            if status is advance.Status.FINISHED:
                 return
-            if status is not Status.STEP_BUDGET or self.steps >= budget:
+            if status is not advance.Status.STEP_BUDGET or self.steps >= budget:
                 raise RunError(self._why(status))
 
     @property
     def steps(self) -> int:
         """Steps tried, the refused ones included."""
-        return int(self.carry.counts[ACCEPTED] + self.carry.counts[REJECTED])
+        return int(self.carry.counts[advance.ACCEPTED] + self.carry.counts[advance.REJECTED])
 
     def forget(self) -> None:
         """Start counting here: empty the tally and sample from now on."""
         for sums in self.tally:
             sums[:] = 0.0
-        self.carry.clock[SAMPLE] = self.carry.clock[NOW]
+        self.carry.clock[advance.SAMPLE] = self.carry.clock[advance.NOW]
 
     def clock_angles(self) -> Array:
         """Angles of inner and outer ring [rad] since the start."""
         clock = self.layout.clock
         if clock is None:
-            return self.carry.clock[NOW] * np.array(self.scene.operation.speeds)
+            return self.carry.clock[advance.NOW] * np.array(self.scene.operation.speeds)
         return self.carry.y[clock + INNER_ANGLE : clock + OUTER_ANGLE + 1].copy()
 
-    def _why(self, status: Status) -> str:
-        time_s = self.carry.clock[NOW]
+    def _why(self, status: advance.Status) -> str:
+        time_s = self.carry.clock[advance.NOW]
         message, remedy = status.value
-        component, step = name(int(self.carry.counts[WORST]), self.layout), self.carry.clock[STEP]
+        component, step = name(int(self.carry.counts[advance.WORST]), self.layout), self.carry.clock[advance.STEP]
         reason = message.format(component=component, step=step, spent_s=self.spent_s, **self.control._asdict())
-        if status is Status.STEP_BUDGET and self.scene.numerics.method in EXPLICIT:
+        if status is advance.Status.STEP_BUDGET and self.scene.numerics.method in EXPLICIT:
             remedy = f"take numerics.method = auto, {remedy}"
         return (
             f"replicate {self.replicate + 1} (seed {self.scene.numerics.seed}) stopped at t = {time_s:.6g} s, shaft turn "
@@ -244,9 +223,9 @@ def cheaper_method(
     scene: Scene,
     bearing: RollerBearing,
     pair: str,
-    control_by: Callable[[str], Control],
-    carry: Carry,
-    tally: Tally,
+    control_by: Callable[[str], advance.Control],
+    carry: advance.Carry,
+    tally: advance.Tally,
     sample_step: float,
 ) -> tuple[str, np.ndarray]:
     """ "rosenbrock" where ``pair`` is stiff and a trial shows the implicit method cheaper, else ``pair``; and the stiffness.
@@ -255,35 +234,35 @@ def cheaper_method(
     """
     # Elastic contacts have no stiff traction, and the implicit method has no room for their coefficients.
     if scene.traction.elasticity:
-        return pair, np.zeros(STIFFNESS)
+        return pair, np.zeros(advance.STIFFNESS)
     trial_s = TRIAL_TURNS * scene.turn_s
     short = control_by(pair)._replace(step_budget=TRIAL_STEPS)
-    run, book = _copy(carry), Tally(*(sums.copy() for sums in tally))
-    run.clock[TRACED] = math.inf
-    status = advance(bearing, short, run, book, trial_s, sample_step)
+    run, book = _copy(carry), advance.Tally(*(sums.copy() for sums in tally))
+    run.clock[advance.TRACED] = math.inf
+    status = advance.advance(bearing, short, run, book, trial_s, sample_step)
     start = _copy(run)
-    derivatives = int(run.counts[DERIVATIVES])
+    derivatives = int(run.counts[advance.DERIVATIVES])
     for counts in (start.counts, run.counts):
         counts[:] = 0
-        counts[DERIVATIVES] = derivatives
+        counts[advance.DERIVATIVES] = derivatives
     run.stiffness[:] = 0.0
-    if status in (FINISHED, STEP_BUDGET):
-        status = advance(bearing, short, run, book, run.clock[NOW] + trial_s, sample_step)
-    if status not in (FINISHED, STEP_BUDGET):
+    if status in (advance.FINISHED, advance.STEP_BUDGET):
+        status = advance.advance(bearing, short, run, book, run.clock[advance.NOW] + trial_s, sample_step)
+    if status not in (advance.FINISHED, advance.STEP_BUDGET):
         return "rosenbrock", run.stiffness
-    turns = (run.clock[NOW] - start.clock[NOW]) / scene.turn_s
-    steps = run.counts[ACCEPTED] + run.counts[REJECTED]
+    turns = (run.clock[advance.NOW] - start.clock[advance.NOW]) / scene.turn_s
+    steps = run.counts[advance.ACCEPTED] + run.counts[advance.REJECTED]
     if held_by_stability(run.stiffness) < STIFF_SHARE or steps < FEWEST_STEPS_PER_TURN * turns:
         return pair, run.stiffness
     start = start._replace(method=method_of("rosenbrock", scene, bearing))
     short = control_by("rosenbrock")._replace(step_budget=TRIAL_STEPS)
-    if advance(bearing, short, start, book, run.clock[NOW], sample_step) != FINISHED:
+    if advance.advance(bearing, short, start, book, run.clock[advance.NOW], sample_step) != advance.FINISHED:
         return pair, run.stiffness
-    cost = IMPLICIT_OVERHEAD * (start.counts[DERIVATIVES] - derivatives)
-    return "rosenbrock" if cost < run.counts[DERIVATIVES] - derivatives else pair, run.stiffness
+    cost = IMPLICIT_OVERHEAD * (start.counts[advance.DERIVATIVES] - derivatives)
+    return "rosenbrock" if cost < run.counts[advance.DERIVATIVES] - derivatives else pair, run.stiffness
 
 
-def _copy(carry: Carry) -> Carry:
+def _copy(carry: advance.Carry) -> advance.Carry:
     """A copy that shares only the work space."""
     data: dict[str, Any] = {key: part.copy() for key, part in carry._asdict().items() if isinstance(part, np.ndarray)}
     return carry._replace(**data)
@@ -291,12 +270,14 @@ def _copy(carry: Carry) -> Carry:
 
 def held_by_stability(stiffness: Sequence[float] | np.ndarray) -> float:
     """Share of the explicit steps tested that stability limited, not accuracy."""
-    return float(stiffness[LIMITED] / stiffness[TESTED]) if stiffness[TESTED] > 0.0 else 0.0
+    return float(stiffness[advance.LIMITED] / stiffness[advance.TESTED]) if stiffness[advance.TESTED] > 0.0 else 0.0
 
 
 def largest_eigenvalue(stiffness: Sequence[float] | np.ndarray) -> float:
     """Mean |eigenvalue| [1/s] of the motion that limited them; zero where none did."""
-    return float(stiffness[EIGENVALUES] / stiffness[LIMITED]) if stiffness[LIMITED] > 0.0 else 0.0
+    return (
+        float(stiffness[advance.EIGENVALUES] / stiffness[advance.LIMITED]) if stiffness[advance.LIMITED] > 0.0 else 0.0
+    )
 
 
 def stiffness_cost(runs: Sequence[Replicate]) -> dict[str, float]:

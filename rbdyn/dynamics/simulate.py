@@ -18,16 +18,8 @@ from rbdyn.dynamics.ensemble import Pace, Reporter, Stop, in_turn, keys_of, log,
 from rbdyn.dynamics.figures import BEARING, DAMAGE, pocket_impacts
 from rbdyn.dynamics.forces.equations import RollerBearing
 from rbdyn.dynamics.forces.state import INNER_LOAD, LAND_LOAD, OUTER_LOAD
+from rbdyn.dynamics.parameters import validity
 from rbdyn.dynamics.parameters.model import roller_bearing
-from rbdyn.dynamics.parameters.validity import (
-    friction_check,
-    friction_notes,
-    heat_notes,
-    left_out_notes,
-    limit_notes,
-    race_notes,
-    slip_notes,
-)
 from rbdyn.dynamics.part_figures import part_figures, races_of
 from rbdyn.dynamics.recording import Ensemble, recording_of, run_until_settled, whole_windows
 from rbdyn.dynamics.run import explicit_method, prepare, stiffness_cost, stiffness_notes
@@ -156,10 +148,10 @@ def _gather(scene: Scene, ensemble: Ensemble, clock: dict[str, float]) -> Simula
     weights = [run.duration for run in runs]
     terms = {term: float(np.average([run.power(term) for run in runs], weights=weights)) for term in POWER_TERMS}
     inner_rolling = float(np.average([run.inner_rolling_resistance for run in runs], weights=weights))
-    maker = friction_check(scene, figures["power_loss_W"].value)
+    maker = validity.friction_check(scene, figures["power_loss_W"].value)
     # The first concern the input, the next the figures of this run, the last what the model leaves out.
     notes: Notes = (
-        *limit_notes(scene),
+        *validity.limit_notes(scene),
         *scene.unit_notes,
         *scene.catalogue_notes,
         *_balance_notes(scene, power_gap),
@@ -169,12 +161,12 @@ def _gather(scene: Scene, ensemble: Ensemble, clock: dict[str, float]) -> Simula
         ),
         *whirl_notes(scene, figures.get("cage_orbit_radius_share")),
         *return_force_notes(runs),
-        *heat_notes(scene, figures["power_loss_W"].value),
-        *friction_notes(maker),
-        *race_notes(scene, races),
-        *slip_notes(scene, figures["cage_slip"].value),
+        *validity.heat_notes(scene, figures["power_loss_W"].value),
+        *validity.friction_notes(maker),
+        *validity.race_notes(scene, races),
+        *validity.slip_notes(scene, figures["cage_slip"].value),
         *_model_notes(scene),
-        *left_out_notes(scene, figures["power_loss_W"].value),
+        *validity.left_out_notes(scene, figures["power_loss_W"].value),
         *scene.section_notes,
         *scene.lubricant.estimates,
         *stiffness_notes(scene, runs),

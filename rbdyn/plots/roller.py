@@ -22,22 +22,8 @@ from rbdyn.dynamics import motion
 from rbdyn.dynamics.cage_verdict import forced_orders, passing_orders
 from rbdyn.dynamics.duty import row_stiffness
 from rbdyn.dynamics.figures import PANELS
+from rbdyn.plots import style
 from rbdyn.plots.drawing import Drawing, Shape, drawing, shapes
-from rbdyn.plots.style import (
-    BLUE,
-    CAGE_COLOURS,
-    GREEN,
-    GREY,
-    INNER,
-    METHOD_COLOURS,
-    ORANGE,
-    OUTER,
-    SKY,
-    VERMILION,
-    plain,
-    plt,
-    save,
-)
 
 if TYPE_CHECKING:
     from rbdyn.dynamics.motion import History
@@ -45,7 +31,7 @@ if TYPE_CHECKING:
     from rbdyn.scene import Scene
 
 SHOWN_POCKETS = 3
-POCKET_COLOURS = (BLUE, ORANGE, GREEN)
+POCKET_COLOURS = (style.BLUE, style.ORANGE, style.GREEN)
 # Above this many times the cage speed a whirl spectrum has only noise.
 SHOWN_ORDERS = 30.0
 # Losses below this share of the whole get no bar.
@@ -57,14 +43,14 @@ def _guide_circle(axis: Axes, history: "History") -> None:
     kind = "pocket" if history.scene.guide_clearance_m is None else "diametral guide"
     angle = np.linspace(0.0, 2.0 * np.pi, 361)
     x, y = clearance * 1e6 * np.cos(angle), clearance * 1e6 * np.sin(angle)
-    axis.plot(x, y, "--", color=GREY, linewidth=0.9, label=f"half of the {kind} clearance")
+    axis.plot(x, y, "--", color=style.GREY, linewidth=0.9, label=f"half of the {kind} clearance")
 
 
 def _plane(axis: Axes) -> None:
     axis.set_aspect("equal", adjustable="datalim")
     axis.locator_params(nbins=6)
     axis.set(xlabel="cage centre, along the load [µm]", ylabel="across [µm]")
-    plain(axis)
+    style.plain(axis)
 
 
 def cage_orbit(
@@ -75,15 +61,15 @@ def cage_orbit(
     ``classes``: of the cage by the title of its history, which names and colours its path.
     """
     columns = len(histories)
-    figure, axes = plt.subplots(3, columns, figsize=(4.8 * columns, 12.6), squeeze=False)
+    figure, axes = style.plt.subplots(3, columns, figsize=(4.8 * columns, 12.6), squeeze=False)
     for column, (title, history) in zip(axes.T, histories.items(), strict=True):
         x, y = (1e6 * part for part in history.guide_eccentricity)
-        colour = CAGE_COLOURS.get(classes.get(title, ""), BLUE)
+        colour = style.CAGE_COLOURS.get(classes.get(title, ""), style.BLUE)
         _orbit_spectrum(column[2], history, colour)
         for axis in column[:2]:
             axis.plot(x, y, linewidth=0.6, color=colour)
-            axis.plot(x[0], y[0], "o", markersize=5, color=GREEN, label="start")
-            axis.plot(x[-1], y[-1], "s", markersize=5, color=VERMILION, label="end")
+            axis.plot(x[0], y[0], "o", markersize=5, color=style.GREEN, label="start")
+            axis.plot(x[-1], y[-1], "s", markersize=5, color=style.VERMILION, label="end")
             _plane(axis)
         _guide_circle(column[0], history)
         column[0].set_title(f"{title}; cage: {classes[title]}" if title in classes else title)
@@ -92,7 +78,7 @@ def cage_orbit(
     figure.legend(
         *axes[0][0].get_legend_handles_labels(), loc="upper center", bbox_to_anchor=(0.5, 0.0), ncol=3, fontsize=8
     )
-    save(figure, path)
+    style.save(figure, path)
 
 
 def _orbit_spectrum(axis: Axes, history: "History", colour: str) -> None:
@@ -103,13 +89,15 @@ def _orbit_spectrum(axis: Axes, history: "History", colour: str) -> None:
     near = abs(order) <= 1.2 * max(map(abs, passing))
     axis.semilogy(order[near], 1e6 * amplitude[near], color=colour, linewidth=0.8)
     marks = {name: (at,) for name, at in forced_orders(history.scene, speed).items()} | {"roller pass": passing}
-    for (name, places), shade in zip(marks.items(), (ORANGE, VERMILION, SKY, GREY), strict=False):
+    for (name, places), shade in zip(
+        marks.items(), (style.ORANGE, style.VERMILION, style.SKY, style.GREY), strict=False
+    ):
         for place in places:
             axis.axvline(place, color=shade, linewidth=0.9, linestyle="--", zorder=1)
         axis.plot([], [], "--", color=shade, label=f"{name} {', '.join(f'{place:.3g}' for place in places)}")
     axis.set(xlabel="order: turns of the orbit in a cage turn", ylabel="radius of the circle [µm]")
     axis.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=len(marks), fontsize=8, frameon=False)
-    plain(axis)
+    style.plain(axis)
 
 
 def _draw_pockets(axis: Axes, history: "History") -> None:
@@ -119,7 +107,7 @@ def _draw_pockets(axis: Axes, history: "History") -> None:
         axis.plot(history.time * 1e3, load, linewidth=0.8, color=colour, label=f"pocket {pocket + 1}")
     axis.axhline(0.0, color="black", linewidth=0.6)
     axis.set_ylabel("wall force [N]\nfront +, rear −")
-    plain(axis)
+    style.plain(axis)
 
 
 def _legend_above(axis: Axes) -> None:
@@ -130,19 +118,19 @@ def _legend_above(axis: Axes) -> None:
 def pocket_forces(histories: "Mapping[str, History]", path: Path) -> None:
     """Wall forces of the pockets with the largest forces over time, a panel each."""
     rows = len(histories)
-    figure, axes = plt.subplots(rows, 1, figsize=(9.0, 3.0 * rows), squeeze=False, sharex=True)
+    figure, axes = style.plt.subplots(rows, 1, figsize=(9.0, 3.0 * rows), squeeze=False, sharex=True)
     for axis, (title, history) in zip(axes[:, 0], histories.items(), strict=True):
         _draw_pockets(axis, history)
         axis.set_title(title, loc="left")
         _legend_above(axis)
     axes[-1, 0].set_xlabel("time after the transient [ms]")
-    save(figure, path)
+    style.save(figure, path)
 
 
 def forces(history: "History", path: Path) -> None:
     """Wall forces of the pockets with the largest forces, and the land's dry load, over time; the largest marked."""
     touched = bool(history.land_load.any())
-    figure, axes = plt.subplots(1 + touched, 1, figsize=(9.0, 3.4 + 2.2 * touched), squeeze=False, sharex=True)
+    figure, axes = style.plt.subplots(1 + touched, 1, figsize=(9.0, 3.4 + 2.2 * touched), squeeze=False, sharex=True)
     pockets = axes[0, 0]
     _draw_pockets(pockets, history)
     hit = motion.largest(history, history.pocket_load)
@@ -152,19 +140,19 @@ def forces(history: "History", path: Path) -> None:
     _legend_above(pockets)
     if touched:
         land = axes[1, 0]
-        land.plot(history.time * 1e3, history.land_load, linewidth=0.8, color=BLUE)
+        land.plot(history.time * 1e3, history.land_load, linewidth=0.8, color=style.BLUE)
         land.set_ylabel("dry load of the\nguide land [N]")
-        plain(land)
+        style.plain(land)
         hit = motion.largest(history, history.land_load)
         _mark(land, history, hit, 1.0, f"{hit.force:.4g} N")
     elif history.scene.guide_clearance_m is not None:
-        pockets.set_title("the guide land is never touched", fontsize=9, color=GREY, loc="left")
+        pockets.set_title("the guide land is never touched", fontsize=9, color=style.GREY, loc="left")
     axes[-1, 0].set_xlabel("time after the transient [ms]")
-    save(figure, path)
+    style.save(figure, path)
 
 
 def _mark(axis: Axes, history: "History", hit: motion.Largest, sign: float, words: str) -> None:
-    axis.plot(hit.time * 1e3, sign * hit.force, "v" if sign > 0.0 else "^", color=VERMILION, markersize=7)
+    axis.plot(hit.time * 1e3, sign * hit.force, "v" if sign > 0.0 else "^", color=style.VERMILION, markersize=7)
     late = hit.time > 0.75 * history.time[-1]
     axis.annotate(f"largest: {words}", (hit.time * 1e3, sign * hit.force), xytext=(-10 if late else 10, -3),
                   textcoords="offset points", ha="right" if late else "left", fontsize=8,
@@ -176,31 +164,31 @@ def whirl(history: "History", path: Path) -> None:
     """Distribution of the instantaneous whirl ratio, with its median, its quartiles and the mean ratio."""
     edges, density = motion.whirl_histogram(history)
     quantiles = motion.whirl_quantiles(history)
-    figure, axis = plt.subplots(figsize=(6.4, 4.0))
-    axis.stairs(density, edges, fill=True, color=SKY)
-    axis.axvspan(quantiles[0.25], quantiles[0.75], color=GREY, alpha=0.15, linewidth=0, label="middle half")
-    axis.axvline(quantiles[0.5], color=BLUE, linewidth=1.4, label=f"median {quantiles[0.5]:.3g}")
+    figure, axis = style.plt.subplots(figsize=(6.4, 4.0))
+    axis.stairs(density, edges, fill=True, color=style.SKY)
+    axis.axvspan(quantiles[0.25], quantiles[0.75], color=style.GREY, alpha=0.15, linewidth=0, label="middle half")
+    axis.axvline(quantiles[0.5], color=style.BLUE, linewidth=1.4, label=f"median {quantiles[0.5]:.3g}")
     mean = motion.whirl_ratio(history)
-    axis.axvline(mean, color=VERMILION, linewidth=1.4, linestyle="--", label=f"mean {mean:.3g}")
+    axis.axvline(mean, color=style.VERMILION, linewidth=1.4, linestyle="--", label=f"mean {mean:.3g}")
     axis.set(xlabel="whirl speed of the cage centre over mean cage speed [-]", ylabel="probability density [-]")
-    plain(axis)
+    style.plain(axis)
     axis.legend(fontsize=8)
-    save(figure, path)
+    style.save(figure, path)
 
 
 def section(history: "History", path: Path) -> None:
     """Poincare sections: the cage centre once a shaft turn and once a cage turn, on its orbit."""
     x, y = (1e6 * part for part in history.guide_eccentricity)
-    figure, axes = plt.subplots(1, 2, figsize=(9.6, 5.4))
+    figure, axes = style.plt.subplots(1, 2, figsize=(9.6, 5.4))
     turns: tuple[Literal["shaft", "cage"], ...] = ("shaft", "cage")
     for axis, turn_of in zip(axes, turns, strict=True):
         place_x, place_y = motion.poincare(history, turn_of)
-        axis.plot(x, y, linewidth=0.4, color=SKY, alpha=0.7, label="orbit")
+        axis.plot(x, y, linewidth=0.4, color=style.SKY, alpha=0.7, label="orbit")
         marks = axis.scatter(place_x * 1e6, place_y * 1e6, c=np.arange(len(place_x)), cmap="viridis", s=22, zorder=3)
         _plane(axis)
         axis.set_title(f"once a {turn_of} turn: {len(place_x)} points", fontsize=10)
         figure.colorbar(marks, ax=axis, label=f"{turn_of} turn", orientation="horizontal", shrink=0.9)
-    save(figure, path)
+    style.save(figure, path)
 
 
 def spectra(history: "History", path: Path) -> None:
@@ -208,7 +196,7 @@ def spectra(history: "History", path: Path) -> None:
     cage = abs(motion.mean_cage_speed(history)) / (2.0 * np.pi)
     passing = cage * history.scene.bearing.rollers
     lines = {"cage": cage, "shaft": 1.0 / history.scene.turn_s, "roller passing": passing}
-    figure, axes = plt.subplots(2, 1, figsize=(9.0, 6.2), sharex=True)
+    figure, axes = style.plt.subplots(2, 1, figsize=(9.0, 6.2), sharex=True)
     signals = (
         (motion.spectrum(history, motion.eccentricity(history)), 1e6, "eccentricity of the cage", "µm"),
         (motion.spectrum(history, history.cage_speed), 30.0 / np.pi, "cage speed", "rpm"),
@@ -217,16 +205,16 @@ def spectra(history: "History", path: Path) -> None:
     for axis, (spectrum, factor, name, unit) in zip(axes, signals, strict=True):
         visible = (spectrum.frequency > 0.0) & (spectrum.frequency <= reach)
         amplitude = factor * spectrum.amplitude[visible]
-        axis.semilogy(spectrum.frequency[visible] * 1e-3, amplitude, color=BLUE, linewidth=1.0)
-        for colour, (_, frequency) in zip((GREEN, ORANGE, VERMILION), lines.items(), strict=True):
+        axis.semilogy(spectrum.frequency[visible] * 1e-3, amplitude, color=style.BLUE, linewidth=1.0)
+        for colour, (_, frequency) in zip((style.GREEN, style.ORANGE, style.VERMILION), lines.items(), strict=True):
             axis.axvline(frequency * 1e-3, color=colour, linewidth=0.9, linestyle="--", zorder=1)
         axis.set_ylabel(f"amplitude of the\n{name} [{unit}]")
-        plain(axis)
-    for colour, (name, frequency) in zip((GREEN, ORANGE, VERMILION), lines.items(), strict=True):
+        style.plain(axis)
+    for colour, (name, frequency) in zip((style.GREEN, style.ORANGE, style.VERMILION), lines.items(), strict=True):
         axes[0].plot([], [], "--", color=colour, linewidth=0.9, label=f"{name}, {frequency:.0f} Hz")
     axes[0].legend(fontsize=8, loc="upper right")
     axes[1].set_xlabel("frequency [kHz]")
-    save(figure, path)
+    style.save(figure, path)
 
 
 def _around(axis: Axes, history: "History", values: np.ndarray, factor: float, colour: str, label: str) -> None:
@@ -235,23 +223,23 @@ def _around(axis: Axes, history: "History", values: np.ndarray, factor: float, c
     axis.fill_between(degrees, factor * profile.low, factor * profile.high, color=colour, alpha=0.2, linewidth=0)
     axis.plot(degrees, factor * profile.mean, color=colour, linewidth=1.4, label=label)
     axis.set(xlim=(-180.0, 180.0), xticks=range(-180, 181, 60))
-    plain(axis)
+    style.plain(axis)
 
 
 def roller_loads(history: "History", path: Path) -> None:
     """Load of a roller on both races against azimuth: mean, and the band of nine tenths."""
-    figure, axis = plt.subplots(figsize=(7.0, 4.2))
-    _around(axis, history, history.outer_load, 1.0, OUTER, "outer raceway")
-    _around(axis, history, history.inner_load, 1.0, INNER, "inner raceway")
+    figure, axis = style.plt.subplots(figsize=(7.0, 4.2))
+    _around(axis, history, history.outer_load, 1.0, style.OUTER, "outer raceway")
+    _around(axis, history, history.inner_load, 1.0, style.INNER, "inner raceway")
     axis.set_ylim(bottom=0.0)
     axis.set(xlabel="azimuth of the roller from the load [°]", ylabel="roller load [N]\nmean, and 5 % to 95 %")
     axis.legend(fontsize=9)
-    save(figure, path)
+    style.save(figure, path)
 
 
 def sliding(history: "History", path: Path) -> None:
     """Slip, pressure times sliding speed, and heat at both races against azimuth."""
-    figure, axes = plt.subplots(3, 1, figsize=(7.0, 8.4), sharex=True)
+    figure, axes = style.plt.subplots(3, 1, figsize=(7.0, 8.4), sharex=True)
     pressed = motion.pressure_velocity(history, "outer"), motion.pressure_velocity(history, "inner")
     panels = (
         ("slip: ring less\nroller surface [m/s]", 1.0, history.outer_slip, history.inner_slip),
@@ -259,13 +247,13 @@ def sliding(history: "History", path: Path) -> None:
         ("heat of a contact [W]", 1.0, history.outer_heat, history.inner_heat),
     )
     for axis, (words, factor, outer, inner) in zip(axes, panels, strict=True):
-        _around(axis, history, outer, factor, OUTER, "outer raceway")
-        _around(axis, history, inner, factor, INNER, "inner raceway")
+        _around(axis, history, outer, factor, style.OUTER, "outer raceway")
+        _around(axis, history, inner, factor, style.INNER, "inner raceway")
         axis.set_ylabel(words)
     axes[0].legend(fontsize=9)
     axes[0].set_title("mean, and 5 % to 95 % of the samples", fontsize=10)
     axes[-1].set_xlabel("azimuth of the roller from the load [°]")
-    save(figure, path)
+    style.save(figure, path)
 
 
 def power_by_loss(terms: Mapping[str, float], path: Path) -> None:
@@ -273,14 +261,14 @@ def power_by_loss(terms: Mapping[str, float], path: Path) -> None:
     total = sum(abs(power) for power in terms.values())
     largest = {term: power for term, power in terms.items() if abs(power) > SMALLEST_SHARE * total}
     names = sorted(largest, key=lambda term: largest[term])
-    figure, axis = plt.subplots(figsize=(7.0, 1.2 + 0.38 * max(len(names), 1)))
-    bars = axis.barh([name.replace("_", " ") for name in names], [largest[name] for name in names], color=BLUE)
+    figure, axis = style.plt.subplots(figsize=(7.0, 1.2 + 0.38 * max(len(names), 1)))
+    bars = axis.barh([name.replace("_", " ") for name in names], [largest[name] for name in names], color=style.BLUE)
     axis.bar_label(bars, fmt="%.3g", padding=3, fontsize=9)
     axis.set_xlabel(f"mean power lost [W], {sum(terms.values()):.4g} W in all")
     axis.margins(x=0.12)
-    plain(axis)
+    style.plain(axis)
     axis.grid(axis="y", visible=False)
-    save(figure, path)
+    style.save(figure, path)
 
 
 # Of a row.
@@ -297,7 +285,7 @@ def draw_slip_map(
     width = max(4.2, 0.85 * len(slip_map.columns) + 2.0)
     count = len(PANELS) + bool(slip_map.cages)
     rows = math.ceil(count / 2)
-    figure, axes = plt.subplots(rows, 2, figsize=(2.0 * width, rows * max(3.2, 0.5 * len(slip_map.rows) + 1.8)))
+    figure, axes = style.plt.subplots(rows, 2, figsize=(2.0 * width, rows * max(3.2, 0.5 * len(slip_map.rows) + 1.8)))
     for axis in axes.ravel()[count:]:
         axis.set_axis_off()
     for axis, panel in zip(axes.ravel(), PANELS, strict=False):
@@ -315,7 +303,7 @@ def draw_slip_map(
     if slip_map.cages:
         _draw_classes(axes.ravel()[len(PANELS)], slip_map, BELOW * bool(marks))
         _mark_points(axes.ravel()[len(PANELS)], slip_map, marks)
-    save(figure, path)
+    style.save(figure, path)
 
 
 def _label_axes(axis: Axes, slip_map: "SlipMap", title: str) -> None:
@@ -328,7 +316,7 @@ def _label_axes(axis: Axes, slip_map: "SlipMap", title: str) -> None:
 def _draw_classes(axis: Axes, slip_map: "SlipMap", below: float) -> None:
     """Cells in the colour of the class of their cage, with its name, replicates, and the share of the commonest class."""
     names = [point.verdict.name if point.verdict else "" for point in slip_map.points]
-    colours = np.array([to_rgb(CAGE_COLOURS.get(name, "white")) for name in names])
+    colours = np.array([to_rgb(style.CAGE_COLOURS.get(name, "white")) for name in names])
     axis.imshow(colours.reshape(len(slip_map.rows), len(slip_map.columns), 3), origin="lower", aspect="auto", alpha=0.5)
     for row, cells in enumerate(slip_map.cages):
         for column, text in enumerate(cells):
@@ -351,21 +339,21 @@ def stiffness_over_clearance(scene: "Scene", path: Path) -> None:
     largest = max(abs(operating), abs(scene.bearing.radial_clearance), 1e-6)
     clearances = np.sort([*np.linspace(*CLEARANCE_SPAN, CLEARANCE_POINTS) * largest, operating])
     rows = [stiffness_row(scene, float(clearance)) for clearance in clearances]
-    figure, (above, below) = plt.subplots(2, 1, figsize=(6.4, 5.6), sharex=True)
+    figure, (above, below) = style.plt.subplots(2, 1, figsize=(6.4, 5.6), sharex=True)
     here = stiffness_row(scene, operating)
     for axis, place, words, colour in (
-        (above, 0, "along the load", BLUE), (above, 1, "across the load", VERMILION), (below, 2, "", GREEN),
+        (above, 0, "along the load", style.BLUE), (above, 1, "across the load", style.VERMILION), (below, 2, "", style.GREEN),
     ):  # fmt: skip
         axis.plot(1e6 * clearances, [row[place] for row in rows], color=colour, label=words)
         axis.plot([1e6 * operating], [here[place]], "o", color=colour)
-        axis.axvline(1e6 * operating, color=GREY, linewidth=0.8, linestyle=":")
-        plain(axis)
+        axis.axvline(1e6 * operating, color=style.GREY, linewidth=0.8, linestyle=":")
+        style.plain(axis)
     above.set(ylabel="stiffness [N/µm]", ylim=(0.0, None), title="Static loads; dots: operating clearance")
     above.legend(frameon=False)
     below.set(
         xlabel="diametral operating clearance [µm]", ylabel="travel of the shaft over a pitch [µm]", ylim=(0.0, None)
     )
-    save(figure, path)
+    style.save(figure, path)
 
 
 def stiffness_row(scene: "Scene", clearance: float) -> tuple[float, float, float]:
@@ -381,14 +369,14 @@ def draw_stiffness(
     speeds_rpm: Sequence[float], loads: Sequence[float], along: Array, across: Array, path: Path
 ) -> None:
     """Stiffness k_xx (full) and k_yy (dashed) [N/um], each (loads, speeds), over speed; a colour a load [N]."""
-    figure, axis = plt.subplots(figsize=(6.4, 4.2))
-    for colour, load, *rows in zip(itertools.cycle(METHOD_COLOURS[1:]), loads, along, across, strict=False):
+    figure, axis = style.plt.subplots(figsize=(6.4, 4.2))
+    for colour, load, *rows in zip(itertools.cycle(style.METHOD_COLOURS[1:]), loads, along, across, strict=False):
         for name, row, line in zip(("k_xx", "k_yy"), rows, ("-", "--"), strict=True):
             axis.plot(speeds_rpm, row, color=colour, linestyle=line, label=f"{name}, {load:g} N")
-    plain(axis)
+    style.plain(axis)
     axis.set(xlabel="inner speed [rpm]", ylabel="stiffness [N/µm]", ylim=(0.0, None))
     axis.legend(frameon=False, fontsize=8, ncols=max(1, len(loads) // 3))
-    save(figure, path)
+    style.save(figure, path)
 
 
 def _mark_points(axis: Axes, slip_map: "SlipMap", marks: Mapping[str, tuple[float, float]]) -> None:
@@ -400,20 +388,26 @@ def _mark_points(axis: Axes, slip_map: "SlipMap", marks: Mapping[str, tuple[floa
         column = float(np.interp(speed, slip_map.columns, range(len(slip_map.columns))))
         row = float(np.interp(load, slip_map.rows, range(len(slip_map.rows))))
         axis.plot(
-            [column], [row], marker="D", markersize=6.0, color=VERMILION, markeredgecolor="white", linestyle="none"
+            [column],
+            [row],
+            marker="D",
+            markersize=6.0,
+            color=style.VERMILION,
+            markeredgecolor="white",
+            linestyle="none",
         )
         # The name is on the side with more room.
         side, shift = ("right", -7.0) if column > 0.5 * (len(slip_map.columns) - 1) else ("left", 7.0)
         axis.annotate(
             ", ".join(together), (column, row), (shift, 9.0), textcoords="offset points", ha=side, va="center",
-            fontsize=8, color="black", bbox={"boxstyle": "round,pad=0.2", "fc": "white", "ec": VERMILION, "lw": 0.8},
+            fontsize=8, color="black", bbox={"boxstyle": "round,pad=0.2", "fc": "white", "ec": style.VERMILION, "lw": 0.8},
         )  # fmt: skip
 
 
 TURNS = 2.0
 FRAMES_PER_TURN = 40
 FRAMES_PER_SECOND = 15
-FORCES = {"outer_force": OUTER, "inner_force": INNER, "cage_force": GREEN}
+FORCES = {"outer_force": style.OUTER, "inner_force": style.INNER, "cage_force": style.GREEN}
 # Fill and edge.
 LOOKS = {
     "ring": ("#e4e7ea", "#8a9096"),
@@ -431,13 +425,13 @@ def moving_bearing(history: "History", stem: Path) -> Path:
     from matplotlib import animation
 
     picture = drawing(history, TURNS, FRAMES_PER_TURN)
-    figure = plt.figure(figsize=(6.0, 6.6), dpi=80)
+    figure = style.plt.figure(figsize=(6.0, 6.6), dpi=80)
     axis = figure.add_axes((0.0, 0.0, 1.0, 6.0 / 6.6))
     figure.text(
         0.02, 0.975, f"clearances magnified {picture.magnification:g} times, rollers drawn smaller",
         fontsize=10, va="center",
     )  # fmt: skip
-    words = figure.text(0.02, 0.935, "", fontsize=10, va="center", color=GREY)
+    words = figure.text(0.02, 0.935, "", fontsize=10, va="center", color=style.GREY)
     turn_s = history.scene.turn_s
 
     def draw(frame: int) -> list[Any]:
@@ -452,7 +446,7 @@ def moving_bearing(history: "History", stem: Path) -> Path:
     ffmpeg = animation.writers.is_available("ffmpeg")
     path = stem.with_suffix(".mp4" if ffmpeg else ".gif")
     film.save(path, writer=(animation.FFMpegWriter if ffmpeg else animation.PillowWriter)(fps=FRAMES_PER_SECOND))
-    plt.close(figure)
+    style.plt.close(figure)
     return path
 
 
@@ -483,6 +477,6 @@ def _add(axis: Axes, shape: Shape) -> None:
     else:
         fill, edge = LOOKS[shape.role]
         line = "--" if shape.role == "land" else "-"
-        style: dict[str, Any] = {"facecolor": fill, "edgecolor": edge, "linewidth": 0.9, "linestyle": line, "zorder": 2}
+        paint: dict[str, Any] = {"facecolor": fill, "edgecolor": edge, "linewidth": 0.9, "linestyle": line, "zorder": 2}
         circle = shape.kind == "circle"
-        axis.add_patch(Circle(shape.points[0], shape.radius, **style) if circle else Polygon(shape.points, **style))
+        axis.add_patch(Circle(shape.points[0], shape.radius, **paint) if circle else Polygon(shape.points, **paint))

@@ -25,19 +25,8 @@ from rbdyn.base.faults import RPM, InputError
 from rbdyn.base.notes import Note, Notes
 from rbdyn.contact import point_contact
 from rbdyn.contact.point_contact import PointContact
+from rbdyn.life import friction
 from rbdyn.life.balls import FASTEST, static_capacity
-from rbdyn.life.friction import (
-    ANGULAR_GEOMETRY,
-    DEEP_GROOVE,
-    DEEP_GROOVE_GEOMETRY,
-    MINERAL_FILM,
-    SYNTHETIC_FILM,
-    FrictionMoments,
-    angular_contact_moments,
-    deep_groove_angle,
-    deep_groove_moments,
-    starvation_factor,
-)
 from rbdyn.properties.catalogue import diameter_series
 from rbdyn.properties.materials import MATERIALS, equivalent_modulus
 from rbdyn.quasistatic.result import BallResult, Rating, overload, reference_capacities
@@ -102,7 +91,7 @@ class Heat(NamedTuple):
     model: RowModel
     solution: Solution
     loads: Loads
-    moments: FrictionMoments
+    moments: friction.FrictionMoments
     powers: Array
     shares: Array
     conductances: Conductances
@@ -134,23 +123,23 @@ def loads_of(scene: SingleRowScene, model: RowModel, solution: Solution) -> Load
         return Loads(radial, z, 0.0)
     carries = HALF_ZONE * radial
     if z > 0.0:
-        carries += z / math.sin(min(deep_groove_angle(z, static_capacity_of(scene, model)), 0.5 * math.pi))
+        carries += z / math.sin(min(friction.deep_groove_angle(z, static_capacity_of(scene, model)), 0.5 * math.pi))
     return Loads(radial, z, max(float(solution.inner_load.sum()) - carries, 0.0))
 
 
-def friction_of(scene: SingleRowScene, model: RowModel, loads: Loads) -> FrictionMoments:
+def friction_of(scene: SingleRowScene, model: RowModel, loads: Loads) -> friction.FrictionMoments:
     """SKF's moments [N m] of a row at the temperature of its oil."""
     lubricant, mounting = scene.lubricant, scene.mounting
     assert lubricant is not None and mounting is not None
     oil, (inner, outer) = lubricant.in_service, scene.operation.speeds
     sizes = mounting.bore, mounting.outside_diameter
     at = *sizes, inner - outer, oil.viscosity / oil.density
-    film = MINERAL_FILM if lubricant.base_oil_name in MINERAL else SYNTHETIC_FILM
+    film = friction.MINERAL_FILM if lubricant.base_oil_name in MINERAL else friction.SYNTHETIC_FILM
     if scene.bearing.kind == "deep_groove_ball":
         series = SERIES[diameter_series(*(1e3 * size for size in sizes))]
-        assert series in DEEP_GROOVE
+        assert series in friction.DEEP_GROOVE
         capacity = static_capacity_of(scene, model)
-        return deep_groove_moments(
+        return friction.deep_groove_moments(
             series,
             *at,
             loads.radial,
@@ -161,12 +150,12 @@ def friction_of(scene: SingleRowScene, model: RowModel, loads: Loads) -> Frictio
             supply=lubricant.supply,
         )
     ratio = scene.material("ball").density / MATERIALS["bearing_steel"].density
-    return angular_contact_moments(
+    return friction.angular_contact_moments(
         *at, loads.radial, loads.axial, density_ratio=ratio, film_friction=film, supply=lubricant.supply
     )
 
 
-def powers_of(scene: SingleRowScene, moments: FrictionMoments) -> Array:
+def powers_of(scene: SingleRowScene, moments: friction.FrictionMoments) -> Array:
     """Losses in the order of ``losses.TERMS`` [W], (terms,): half of each moment's power at either race."""
     inner, outer = scene.operation.speeds
     rolling, sliding = (0.5 * abs(inner - outer) * moment for moment in moments)
@@ -292,7 +281,7 @@ RANGE_TOLERANCE = 0.1
 LEVELS = {"deep_groove_ball": "0.67 to 0.93", "angular_contact_ball": "1.9 to 2.7"}
 
 # K_Z of SKF's starvation factor by kind, and a factor far below those of bearings at their reference speed.
-GEOMETRIES = {"deep_groove_ball": DEEP_GROOVE_GEOMETRY, "angular_contact_ball": ANGULAR_GEOMETRY}
+GEOMETRIES = {"deep_groove_ball": friction.DEEP_GROOVE_GEOMETRY, "angular_contact_ball": friction.ANGULAR_GEOMETRY}
 STARVED = 0.1
 
 
@@ -471,7 +460,7 @@ def starvation_note(hot: SingleRowScene, subject: str) -> Notes:
     assert lubricant is not None and mounting is not None
     oil = lubricant.in_service
     sizes = mounting.bore, mounting.outside_diameter, inner - outer, oil.viscosity / oil.density
-    factor = starvation_factor(GEOMETRIES[hot.bearing.kind], *sizes, lubricant.supply)
+    factor = friction.starvation_factor(GEOMETRIES[hot.bearing.kind], *sizes, lubricant.supply)
     if factor >= STARVED:
         return ()
     sentence = (

@@ -13,19 +13,9 @@ from rbdyn.mounting.rings import MountedRings
 from rbdyn.scene import Scene
 from rbdyn.scene.fits import mounted_rings
 from rbdyn.scene.thermal import Temperatures, Thermal, part_temperatures
+from rbdyn.thermal import start as warming
 from rbdyn.thermal.fixed_point import State
 from rbdyn.thermal.network import NODES, Boundaries
-from rbdyn.thermal.start import (
-    HOUSING,
-    SHAFT,
-    Course,
-    Moment,
-    Seats,
-    Surroundings,
-    Warming,
-    capacities_of,
-    seats_between,
-)
 
 # Names of clearances in JSON by those of a scene.
 NAMES = {"radial": "radial_um", "guide": "guide_um", "pocket": "pocket_um"}
@@ -45,7 +35,7 @@ def capacities(scene: Scene, thermal: Thermal) -> Array:
     oil = scene.oil()
     fill = 1.0 if scene.lubricant.supply == "bath" else scene.lubricant.oil_fraction
     full = fill * cavity_of(scene) * oil.density * oil.heat_capacity
-    return capacities_of(_rings(scene), ring_width(scene), start.widths, full, rollers)
+    return warming.capacities_of(_rings(scene), ring_width(scene), start.widths, full, rollers)
 
 
 def _rings(scene: Scene) -> MountedRings:
@@ -54,9 +44,9 @@ def _rings(scene: Scene) -> MountedRings:
     return mounted_rings(scene.mounting, scene.bearing, material, material, *scene.operation.speeds)
 
 
-def seats_of(hot: Scene) -> Seats:
+def seats_of(hot: Scene) -> warming.Seats:
     """Conductances of both seats of a scene at temperatures: the gap of a loose fit has oil [W/K]."""
-    return seats_between(_rings(hot), ring_width(hot), hot.oil().conductivity)
+    return warming.seats_between(_rings(hot), ring_width(hot), hot.oil().conductivity)
 
 
 class Clearances(NamedTuple):
@@ -74,7 +64,9 @@ def clearances_at(hot: Scene, thermal: Thermal, temperatures: Array, speed_ratio
     mounting = hot.mounting
     assert mounting is not None
     nodes = Temperatures(*np.moveaxis(temperatures[..., : len(NODES)], -1, 0))
-    keys = part_temperatures(thermal, nodes, seats=(temperatures[..., HOUSING], temperatures[..., SHAFT]))
+    keys = part_temperatures(
+        thermal, nodes, seats=(temperatures[..., warming.HOUSING], temperatures[..., warming.SHAFT])
+    )
     turning = mounting.model_copy(update=keys)
     found = [_clearances(hot, turning), _clearances(hot, turning.model_copy(update={"rotation": False}))]
 
@@ -119,13 +111,15 @@ class Machine(NamedTuple):
     hot: Scene
     thermal: Thermal
     capacities: Array
-    course: Course
+    course: warming.Course
     cold: Array
     state: State
     boundaries: Boundaries
     end: float
 
-    def clearances(self, rows: Warming, thermal: Thermal | None = None) -> tuple[dict[str, Array], dict[str, Array]]:
+    def clearances(
+        self, rows: warming.Warming, thermal: Thermal | None = None
+    ) -> tuple[dict[str, Array], dict[str, Array]]:
         """Clearances [um] by name over time, and what is left of those that may not be lost."""
         speeds = self.course.at(rows.times)[0] / turning_speed(self.scene)
         ratios = speeds.reshape(-1, *[1] * (rows.temperatures.ndim - 2))
@@ -138,7 +132,7 @@ class Path(NamedTuple):
     ``seizing``: the clearance that is lost at the end, if any.
     """
 
-    rows: Warming
+    rows: warming.Warming
     figures: dict[str, Array]
     seizing: str | None
 
@@ -146,9 +140,9 @@ class Path(NamedTuple):
 class Simulated(NamedTuple):
     """A simulated moment: the ``moment`` of the law, its time [s], speed [rad/s], load [N], what is ``around`` it, and its power's error."""
 
-    moment: Moment
+    moment: warming.Moment
     time: float | None
     speed: float
     load: float
-    around: Surroundings
+    around: warming.Surroundings
     scatter: float
