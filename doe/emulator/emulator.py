@@ -57,16 +57,15 @@ class Hyperparameters(NamedTuple):
 class Emulator:
     """A fitted emulator of one response.
 
-    ``points`` (n, k), ``values`` (n,) and known ``variances`` (n,) of the runs; the trend has the ``degree`` 0 to 2 in the first
-    ``columns`` coordinates; ``middle``: mean of the runs; ``likelihood``: logarithm of that of the hyperparameters;
-    ``regressor``: scikit-learn's, of the values about their middle.
+    ``points`` (n, k), ``values`` (n,) and known ``variances`` (n,) of the runs; the trend has the ``degree`` 0 to 2;
+    ``middle``: mean of the runs; ``likelihood``: logarithm of that of the hyperparameters; ``regressor``: scikit-learn's, of the
+    values about their middle.
     """
 
     points: Array
     values: Array
     variances: Array
     degree: int
-    columns: int
     middle: float
     hyperparameters: Hyperparameters
     likelihood: float
@@ -132,12 +131,13 @@ class Emulator:
     def terms(self) -> tuple[str, ...]:
         """Terms of the trend, the level included."""
         level = ("1",) if self.hyperparameters.level > 0.0 else ()
-        return (level, model_terms(self.columns, "linear"), model_terms(self.columns, "quadratic"))[self.degree]
+        inputs = self.points.shape[1]
+        return (level, model_terms(inputs, "linear"), model_terms(inputs, "quadratic"))[self.degree]
 
     @cached_property
     def term_variances(self) -> Array:
         """Prior variances (p,) of the coefficients of the terms: the kernel of the trend is their sum over products of terms."""
-        powers = term_powers(self.terms, self.columns)
+        powers = term_powers(self.terms, self.points.shape[1])
         constant = powers.sum(axis=1) == 0
         # The square of 1 + x'y has every product of two different of its parts twice.
         twice = (self.degree == 2) & (powers.max(axis=1, initial=0) == 1)
@@ -226,17 +226,17 @@ def fit_emulator(
             "emulator: a point, value or variance is not a finite number, or a variance is below 0; fix it"
         )
     middle = 0.0 if trend == "none" else float(responses.mean())
-    form = DEGREES[trend], places.shape[1]
+    degree = DEGREES[trend]
     hyperparameters, about = start, responses - middle
     if search or hyperparameters is None:
         rows = slice(None, None, -(-len(places) // MOST_SEARCHED))
         runs = places[rows], about[rows], noise[rows]
-        warm = None if start is None else Trended(*start, *form)
-        kernel = mode(*runs, *form, prior, warm, level=trend != "none")
+        warm = None if start is None else Trended(*start, degree)
+        kernel = mode(*runs, degree, prior, warm, level=trend != "none")
         hyperparameters = Hyperparameters(kernel.lengths, kernel.variance, kernel.nugget, kernel.trend, kernel.level)
-    regressor = regression(Trended(*hyperparameters, *form), places, about, noise)
+    regressor = regression(Trended(*hyperparameters, degree), places, about, noise)
     likelihood = float(regressor.log_marginal_likelihood_value_)
-    return Emulator(places, responses, noise, *form, middle, hyperparameters, likelihood, regressor)
+    return Emulator(places, responses, noise, degree, middle, hyperparameters, likelihood, regressor)
 
 
 def leave_one_out(factor: Array, weights: Array) -> tuple[Array, Array]:

@@ -36,15 +36,12 @@ ENOUGH = {"ftol": 1e-7, "maxiter": 100}  # of a logarithm of the posterior
 class Trended(Kernel):
     """level + trend (1 + x'y)^degree + variance Matern(x, y; lengths), plus the nugget between a run and itself.
 
-    The trend is in the first ``columns`` coordinates. Hyperparameters are the logarithms of trend, variance, lengths and nugget,
-    in this order; the level is fixed.
+    Hyperparameters are the logarithms of trend, variance, lengths and nugget, in this order; the level is fixed.
     """
 
-    def __init__(
-        self, lengths: Array, variance: float, nugget: float, trend: float, level: float, degree: int, columns: int
-    ):
+    def __init__(self, lengths: Array, variance: float, nugget: float, trend: float, level: float, degree: int):
         self.lengths, self.variance, self.nugget = lengths, variance, nugget
-        self.trend, self.level, self.degree, self.columns = trend, level, degree, columns
+        self.trend, self.level, self.degree = trend, level, degree
         self._runs: Array | None = None
 
     @property
@@ -81,14 +78,12 @@ class Trended(Kernel):
         """Prior variance (n,) of the response at points (n, k)."""
         variance = np.full(len(X), self.level + self.variance)
         if self.degree:
-            variance += self.trend * DotProduct(1.0).diag(X[:, : self.columns]) ** self.degree
+            variance += self.trend * DotProduct(1.0).diag(X) ** self.degree
         return variance
 
     def _power(self, points: Array, other: Array | None = None) -> Array:
         """(1 + x'y)^degree (n, m)."""
-        columns = slice(self.columns)
-        product = DotProduct(1.0)(points[:, columns], None if other is None else other[:, columns])
-        return np.asarray(product**self.degree)
+        return np.asarray(DotProduct(1.0)(points, other) ** self.degree)
 
     def _with_gradient(self, runs: Array) -> tuple[Array, Array]:
         """Kernel (n, n) of runs (n, k) and its gradient, valid until the next call: the search asks for it hundreds of times."""
@@ -158,7 +153,6 @@ def mode(
     values: Array,
     variances: Array,
     degree: int,
-    columns: int,
     prior: tuple[float, float],
     start: Trended | None,
     level: bool,
@@ -182,7 +176,7 @@ def mode(
         box=np.log([TREND_BOX, VARIANCE_BOX, *[LENGTH_BOX] * inputs, NUGGET_BOX]) + scale[:, None],
         start=None if start is None else start.theta,
     )
-    kernel = Trended(half, unit, unit, unit, PRIOR_DEVIATION**2 * unit if level else 0.0, degree, columns)
+    kernel = Trended(half, unit, unit, unit, PRIOR_DEVIATION**2 * unit if level else 0.0, degree)
     return regression(kernel, points, values, variances, search).kernel_
 
 

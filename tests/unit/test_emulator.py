@@ -57,13 +57,13 @@ def test_oracle_kernels_of_scikit_learn(trend):
     assert found[1][-len(slope) :] == pytest.approx(slope, rel=1e-7)
 
 
-def test_the_trend_is_in_the_first_coordinates_alone():
-    kernel = Trended(*GIVEN, 2, 2)
+def test_the_trend_is_a_power_of_the_product_of_points():
+    kernel = Trended(*GIVEN, 2)
     alike = np.array([[0.3, -0.4, 0.1], [0.3, -0.4, 0.9]])
     process = GIVEN.variance * Matern(GIVEN.lengths, nu=2.5)(alike)
-    assert kernel(alike, alike) - process == pytest.approx(np.full((2, 2), 50.0 + 0.7 * 1.25**2))
+    assert kernel(alike, alike) - process == pytest.approx(50.0 + 0.7 * (1.0 + alike @ alike.T) ** 2)
     assert kernel.diag(alike) == pytest.approx(np.diag(kernel(alike, alike)))
-    assert not kernel.is_stationary() and Trended(*GIVEN, 0, 2).is_stationary()
+    assert not kernel.is_stationary() and Trended(*GIVEN, 0).is_stationary()
 
 
 @pytest.mark.parametrize("trend", list(DEGREES))
@@ -114,7 +114,7 @@ def test_leaving_out_is_refitting_without():
     mean, deviation = emulator.leave_one_out()
     for row in (0, 7, 29):
         rows = np.arange(30) != row
-        kernel = Trended(*GIVEN, 2, 3)
+        kernel = Trended(*GIVEN, 2)
         refit = regression(kernel, POINTS[rows], VALUES[rows] - emulator.middle, VARIANCES[rows])
         predicted, spread = refit.predict(POINTS[row : row + 1], return_cov=True)
         assert mean[row] == pytest.approx(emulator.middle + predicted[0], abs=1e-7)
