@@ -18,7 +18,7 @@ from types import UnionType
 from typing import TYPE_CHECKING, Any, Literal, Self, Union, dataclass_transform, get_args, get_origin, get_type_hints
 
 from rbdyn.base.notes import Note
-from rbdyn.base.words import Brief
+from rbdyn.base.words import Brief, counted
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -113,6 +113,21 @@ class Record:
             if path or value or item.default is MISSING:
                 values[item.name] = restore(_kinds(cls)[item.name], value)
         return cls(**values)
+
+
+class OverPoints:
+    """What results over ``points`` have in common: a point that failed has another ``status`` than "ok"."""
+
+    points: Any
+
+    @property
+    def failed(self) -> list[Any]:
+        """Points without figures that hold."""
+        return [point for point in self.points if point.status != "ok"]
+
+    def count_failed(self) -> str:
+        """ "ok", or how many points failed."""
+        return f"{len(self.failed)} of {counted(len(self.points), 'point')} failed" if self.failed else "ok"
 
 
 def json_fields(record: Record | type[Record]) -> list[tuple[Field[Any], tuple[str, ...]]]:

@@ -20,7 +20,7 @@ from rbdyn.base.faults import MOST_VALUES, RPM, InputError, MethodError, RunErro
 from rbdyn.base.files import versions, write_json
 from rbdyn.base.identity import identity_of
 from rbdyn.base.notes import Note, Notes
-from rbdyn.base.records import Record, derived
+from rbdyn.base.records import OverPoints, Record, derived
 from rbdyn.base.words import counted
 from rbdyn.life.rollers import turned
 from rbdyn.scene import BallScene, Scene, scene_of
@@ -77,13 +77,11 @@ def stiffness_sheet(points: Sequence[StiffnessPoint]) -> Sheet[StiffnessPoint]:
     return Sheet("", columns, points, file="stiffness.csv", content=content)
 
 
-class StiffnessMap(Record):
+class StiffnessMap(OverPoints, Record):
     """Points in rows of rising load, speeds rising in each row; ``load_angle_deg``: direction of the load from x of the matrices."""
 
     format: str = derived(lambda self: FORMAT)
-    status: str = derived(
-        lambda self: f"{len(self.failed)} of {counted(len(self.points), 'point')} failed" if self.failed else "ok"
-    )
+    status: str = derived(lambda self: self.count_failed())
     speeds_rpm: tuple[float, ...]
     loads_N: tuple[float, ...]  # noqa: N815
     load_angle_deg: float
@@ -91,11 +89,6 @@ class StiffnessMap(Record):
     points: tuple[StiffnessPoint, ...]
     versions: dict[str, str] = derived(lambda self: versions())
     notes: Notes = derived(lambda self: self._notes())
-
-    @property
-    def failed(self) -> list[StiffnessPoint]:
-        """Points without a stiffness."""
-        return [point for point in self.points if point.status != "ok"]
 
     def _notes(self) -> Notes:
         if self.loss_factor:

@@ -14,8 +14,8 @@ from rbdyn.base.estimate import errors_of_differences
 from rbdyn.base.faults import InputError, RunError
 from rbdyn.base.files import versions
 from rbdyn.base.notes import Note, Notes, merged
-from rbdyn.base.records import Record, derived, finite, keyed, nullable
-from rbdyn.base.words import Notice, counted, named, part_of
+from rbdyn.base.records import OverPoints, Record, derived, finite, keyed, nullable
+from rbdyn.base.words import Notice, named, part_of
 from rbdyn.dynamics.duty import load_case
 from rbdyn.dynamics.ensemble import Reporter, log, plan_of, threads_of
 from rbdyn.dynamics.figures import FIGURES
@@ -87,14 +87,12 @@ class Worst(Record):
     not_told_apart: tuple[str, ...]
 
 
-class DutySimulation(SavedRecord, kw_only=True):
+class DutySimulation(OverPoints, SavedRecord, kw_only=True):
     """A bearing at each point of a duty; ``life``: over the duty, None where a point failed; ``worst``: by name of the figure."""
 
     FORMAT = "rbdyn.duty/1"
     WHAT = "simulation over a duty"
-    status: str = derived(
-        lambda self: f"{len(self.failed)} of {counted(len(self.points), 'point')} failed" if self.failed else "ok"
-    )
+    status: str = derived(lambda self: self.count_failed())
     points: tuple[SimulatedPoint, ...]
     worst: dict[str, Worst]
     life: dict[str, float | None] | None
@@ -103,11 +101,6 @@ class DutySimulation(SavedRecord, kw_only=True):
     seed: int
     versions: dict[str, str]
     scene: dict[str, Any]
-
-    @property
-    def failed(self) -> list[SimulatedPoint]:
-        """Points without figures that hold."""
-        return [point for point in self.points if point.status != "ok"]
 
     @property
     def sheet(self) -> Sheet[SimulatedPoint]:

@@ -18,8 +18,8 @@ from rbdyn.base.blocks import Column, Sheet
 from rbdyn.base.faults import MOST_VALUES, InputError, RunError, refuse
 from rbdyn.base.files import Checkpoint, code_version, run_key, versions
 from rbdyn.base.notes import Notes, status_of
-from rbdyn.base.records import Record, derived, keyed, nullable, spread
-from rbdyn.base.words import Notice, counted, quantity
+from rbdyn.base.records import OverPoints, Record, derived, keyed, nullable, spread
+from rbdyn.base.words import Notice, quantity
 from rbdyn.contact.hertz_line import ROLLERS, pressure_notes
 from rbdyn.dynamics.cage_verdict import verdict_of
 from rbdyn.dynamics.ensemble import Outcome, Pace, Reporter, Stop, in_turn, keys_of, log, plan_of, run_all, threads_of
@@ -102,16 +102,14 @@ def map_sheet(points: Sequence[Point], figures: Iterable[str] = ()) -> Sheet[Poi
     )
 
 
-class SlipMap(Record):
+class SlipMap(OverPoints, Record):
     """Points in rows of rising values of the second of the ``axes``, values of the first rising in each row; ``wall_s``: their wall time.
 
     ``axes``: values by key, speed as the first and load as the second where they are varied; ``speeds_rpm`` and ``loads_N`` state them again.
     """
 
     format: str = derived(lambda self: FORMAT)
-    status: str = derived(
-        lambda self: f"{len(self.failed)} of {counted(len(self.points), 'point')} failed" if self.failed else "ok"
-    )
+    status: str = derived(lambda self: self.count_failed())
     axes: dict[str, tuple[float, ...]]
     speeds_rpm: tuple[float, ...] | None = derived(lambda self: self.axes.get(AXES[0]))
     loads_N: tuple[float, ...] | None = derived(lambda self: self.axes.get(AXES[1]))  # noqa: N815
@@ -120,11 +118,6 @@ class SlipMap(Record):
     seed: int
     versions: dict[str, str] = derived(lambda self: versions())
     notes: Notes = derived(lambda self: self._notes())
-
-    @property
-    def failed(self) -> list[Point]:
-        """Points without figures, or with those of no bearing."""
-        return [point for point in self.points if point.status != "ok"]
 
     def _notes(self) -> Notes:
         """Notes of the points, each code once, with the number of its points and the last of them."""

@@ -44,7 +44,7 @@ from rbdyn.result import Quantity, SimulationResult
 from rbdyn.scene import Scene
 from rbdyn.scene.input_ranges import Ranges, input_ranges
 from rbdyn.scene.notes import heat_notes
-from rbdyn.scene.thermal import Temperatures, Thermal, at_temperatures, ceilings, inlet_temperature, part_temperatures
+from rbdyn.scene.thermal import Temperatures, Thermal, at_temperatures, inlet_temperature, part_temperatures, too_hot
 from rbdyn.thermal.fixed_point import CLEAR, VAGUE, State, learned, model_of, next_step, steady_state
 from rbdyn.thermal.losses import HOTTEST, HeatModel, gain, log_viscosity, no_residue
 from rbdyn.thermal.network import NODES, carried_off
@@ -382,7 +382,7 @@ def steady_scene(scene: Scene, simulate: Simulate) -> Scene:
     verdict = verdict_of(Balance(scene, simulate))
     if not verdict.steady:
         raise RunError(f"temperatures: {verdict.status}: {verdict.reason}")
-    if excess := _over_ceilings(scene, dict(zip(NODES, verdict.temperatures.tolist(), strict=True))):
+    if excess := too_hot(scene, dict(zip(NODES, verdict.temperatures.tolist(), strict=True))):
         raise RunError(f"temperatures: too hot: {excess}")
     return at_temperatures(scene, Temperatures(*verdict.temperatures.tolist()))
 
@@ -395,7 +395,7 @@ def _result(
     steady = status == "steady"
     temperatures = _quantities(trial, state, slopes if steady else np.zeros_like(slopes), steady)
     values = {node: figure.value for node, figure in temperatures.items()}
-    if steady and (excess := _over_ceilings(scene, values)):
+    if steady and (excess := too_hot(scene, values)):
         status, reason = "too hot", excess
     result = gather(
         trial.hot, trial.ensemble, {**trial.clock, "compile_s": balance.compile_s, "wall_s": balance.wall_s}
@@ -480,19 +480,6 @@ def _quantities(trial: Trial, state: State, slopes: Array, steady: bool) -> dict
             else replace(node, value=float(state.temperatures[place]), statistical_error=None, numerical_error=None)
         )
     return figures
-
-
-def _over_ceilings(scene: Scene, temperatures: dict[str, float]) -> str:
-    """A sentence on the oil or the cage above its ceiling; empty where both are below."""
-    thermal = scene.thermal
-    assert thermal is not None
-    parts = {"oil": temperatures["oil"], "cage": temperatures["rollers"] + thermal.cage_offset_K}
-    excesses = [
-        f"the {part} reaches {parts[part]:.0f} C, above its ceiling of {ceiling:g} C (thermal.{part}_ceiling_C)"
-        for part, ceiling in ceilings(scene).items()
-        if parts[part] > ceiling
-    ]
-    return "; ".join(excesses)
 
 
 def _new(notes: Notes, scene: Scene, hot: Scene, status: str) -> list[Note]:

@@ -37,8 +37,8 @@ from rbdyn.scene.fits import race_film_temperature
 from rbdyn.scene.input_ranges import Ranges, input_ranges
 from rbdyn.scene.notes import heat_notes
 from rbdyn.scene.operation import raceway_radii
-from rbdyn.scene.thermal import Temperatures, Thermal, inlet_temperature, oil_ceiling, part_temperatures
-from rbdyn.thermal.conductances import half_space_contact, oil_flow, seats, sump, surface_coefficient
+from rbdyn.scene.thermal import Temperatures, Thermal, inlet_temperature, oil_ceiling, over_ceiling, part_temperatures
+from rbdyn.thermal.conductances import half_space_contact, surface_coefficient
 from rbdyn.thermal.fixed_point import Search, State, model_of, steady_state
 from rbdyn.thermal.losses import TERMS, Effusivities, HeatModel, Losses, gain, log_viscosity, no_residue, shares
 from rbdyn.thermal.network import NODES, OIL, Boundaries, Conductances, carried_off, temperatures
@@ -205,10 +205,8 @@ def conductances_of(scene: SingleRowScene, thermal: Thermal, model: RowModel, so
     inner, outer = raceway_radii(drawing)
     cage = cage_speed(drawing, *scene.operation.speeds)
     transfer = thermal.surface_factor * surface_coefficient(oil, cage, drawing.pitch_diameter)
-    flow = lubricant.oil_flow
-    housing, shaft = seats(mounting.bore, mounting.outside_diameter, width)
     return Conductances(
-        flow=0.0 if flow is None else oil_flow(flow, oil, thermal.oil_share),
+        **thermal.ways_out(lubricant, oil, mounting, width),
         oil_outer=transfer * 2.0 * math.pi * outer * width,
         oil_inner=transfer * 2.0 * math.pi * inner * width,
         oil_rollers=transfer * drawing.balls * math.pi * drawing.ball_diameter**2,
@@ -216,9 +214,6 @@ def conductances_of(scene: SingleRowScene, thermal: Thermal, model: RowModel, so
         * contact_conductance(scene, model.outer_contact, "outer", solution.outer_load),
         inner_rollers=thermal.contact_factor
         * contact_conductance(scene, model.inner_contact, "inner", solution.inner_load),
-        outer_ambient=thermal.housing_factor * housing,
-        inner_ambient=thermal.shaft_factor * shaft,
-        sump=thermal.sump_factor * sump(mounting.outside_diameter, width) if lubricant.supply == "bath" else 0.0,
     )
 
 
@@ -370,13 +365,8 @@ def _seized_cold(scene: SingleRowScene, reason: str, solve: Callable[[SingleRowS
 def ceiling_verdict(scene: SingleRowScene, nodes: dict[str, float]) -> tuple[str, str]:
     """Status and reason of steady temperatures [C]: "too hot" with oil above its ceiling."""
     assert scene.thermal is not None and scene.lubricant is not None
-    ceiling = oil_ceiling(scene.thermal, scene.lubricant)
-    if nodes["oil"] <= ceiling:
-        return "steady", ""
-    return (
-        "too hot",
-        f"the oil reaches {nodes['oil']:.0f} C, above its ceiling of {ceiling:g} C (thermal.oil_ceiling_C)",
-    )
+    excess = over_ceiling("oil", nodes["oil"], oil_ceiling(scene.thermal, scene.lubricant))
+    return ("too hot", excess) if excess else ("steady", "")
 
 
 def ranges_of(scene: SingleRowScene, state: State, slopes: Array) -> Ranges:

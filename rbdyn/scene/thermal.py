@@ -18,6 +18,7 @@ from rbdyn.scene.operation import SLOWEST_RPM, Load, Mounting
 
 if TYPE_CHECKING:
     from rbdyn.mounting.rings import MountedRings
+    from rbdyn.properties.materials import Oil
     from rbdyn.result import SimulationResult
     from rbdyn.scene import Scene
     from rbdyn.thermal.start import Course
@@ -237,6 +238,19 @@ class Thermal(Sparse):
     near: Near | None = None
     """Heat balance of a similar bearing, from which the search begins. Default: a search from lubricant.temperature_C."""
 
+    def ways_out(self, lubricant: Lubricant, oil: "Oil", mounting: Mounting, width: float) -> dict[str, float]:
+        """Conductances to the oil stream and the surroundings by name [W/K], of a bearing with rings of a ``width`` [m]."""
+        from rbdyn.thermal.conductances import oil_flow, seats, sump
+
+        housing, shaft = seats(mounting.bore, mounting.outside_diameter, width)
+        flow, bath = lubricant.oil_flow, lubricant.supply == "bath"
+        return {
+            "flow": 0.0 if flow is None else oil_flow(flow, oil, self.oil_share),
+            "outer_ambient": self.housing_factor * housing,
+            "inner_ambient": self.shaft_factor * shaft,
+            "sump": self.sump_factor * sump(mounting.outside_diameter, width) if bath else 0.0,
+        }
+
 
 class Temperatures(NamedTuple):
     """Temperatures [C] of the oil in the cavity, outer ring, inner ring, and rolling elements."""
@@ -275,6 +289,12 @@ def film_temperatures(scene: "Scene", rings: "MountedRings | None") -> FilmTempe
     )
 
 
+def over_ceiling(part: str, temperature: float, ceiling: float) -> str:
+    """A sentence on the oil or the cage above its ceiling [C]; empty below."""
+    sentence = f"the {part} reaches {temperature:.0f} C, above its ceiling of {ceiling:g} C (thermal.{part}_ceiling_C)"
+    return sentence if temperature > ceiling else ""
+
+
 def oil_ceiling(thermal: Thermal, lubricant: Lubricant) -> float:
     """Highest allowed temperature of the oil [C], stated or by its base oil."""
     return OIL_CEILINGS[lubricant.base_oil_name] if thermal.oil_ceiling_C is None else thermal.oil_ceiling_C
@@ -290,6 +310,14 @@ def ceilings(scene: "Scene") -> dict[str, float]:
     if cage is None and isinstance(name, str):
         cage = CAGE_CEILINGS.get(name)
     return {"oil": oil} | ({} if cage is None else {"cage": cage})
+
+
+def too_hot(scene: "Scene", temperatures: Mapping[str, float]) -> str:
+    """A sentence on the oil or the cage above its ceiling at temperatures of the nodes [C]; empty where both are below."""
+    assert scene.thermal is not None
+    parts = {"oil": temperatures["oil"], "cage": temperatures["rollers"] + scene.thermal.cage_offset_K}
+    excesses = (over_ceiling(part, parts[part], ceiling) for part, ceiling in ceilings(scene).items())
+    return "; ".join(filter(None, excesses))
 
 
 def inlet_temperature(thermal: Thermal, lubricant: Lubricant) -> float:

@@ -18,16 +18,7 @@ from rbdyn.losses import INNER_ROLLING, LOSSES, POWER_TERMS, POWERS, ROLLING
 from rbdyn.scene import Scene
 from rbdyn.scene.notes import catalogue_entry
 from rbdyn.scene.thermal import Thermal, inlet_temperature
-from rbdyn.thermal.conductances import (
-    CageSize,
-    cavity_volume,
-    oil_flow,
-    race_contact,
-    seats,
-    sump,
-    surface_coefficient,
-    surfaces,
-)
+from rbdyn.thermal.conductances import CageSize, cavity_volume, race_contact, surface_coefficient, surfaces
 from rbdyn.thermal.losses import GUIDES, TERMS, Effusivities, HeatModel, Losses, no_residue, shares
 from rbdyn.thermal.network import NODES, OIL, ROLLERS, Boundaries, Conductances, matrix, source
 from rbdyn.thermal.oil_fraction import fraction_notes, residence
@@ -136,18 +127,13 @@ def _conductances(hot: Scene, thermal: Thermal, bearing: RollerBearing) -> Condu
         else 0.0
         for race in ("outer", "inner")
     }
-    housing, shaft = seats(mounting.bore, mounting.outside_diameter, width)
-    flow = lubricant.oil_flow
     return Conductances(
-        flow=0.0 if flow is None else oil_flow(flow, oil, thermal.oil_share),
+        **thermal.ways_out(lubricant, oil, mounting, width),
         oil_outer=film * areas.outer,
         oil_inner=film * areas.inner,
         oil_rollers=film * (areas.rollers + areas.cage),
         outer_rollers=races["outer"],
         inner_rollers=races["inner"],
-        outer_ambient=thermal.housing_factor * housing,
-        inner_ambient=thermal.shaft_factor * shaft,
-        sump=thermal.sump_factor * sump(mounting.outside_diameter, width) if lubricant.supply == "bath" else 0.0,
     )
 
 

@@ -11,33 +11,13 @@ import numpy as np
 from rbdyn.base.arrays import Array
 from rbdyn.base.faults import InputError
 from rbdyn.contact import film_thickness, traction
+from rbdyn.contact import rolling_resistance as resistance
 from rbdyn.contact.cage_film import short_journal_film
 from rbdyn.contact.damping import HuntCrossleyDamping, NoDamping, ViscousDamping
 from rbdyn.contact.hertz_line import LineContactOnBar, dowson_higginson, houpert, iso_16281, palmgren, slice_contact
-from rbdyn.contact.rolling_resistance import (
-    LayerFilm,
-    NoRollingResistance,
-    OpenFilm,
-    aihara_thermal_factor,
-    biboulet_houpert,
-    gap_ahead,
-    open_film,
-    starved,
-    touching_gap,
-)
 from rbdyn.contact.tangential import ElasticContact, RigidContact
 from rbdyn.contact.traction import CoulombTraction, NoTraction, dry_friction
-from rbdyn.dynamics.forces.bodies import (
-    BalancedCage,
-    Gravity,
-    HeldRing,
-    NoDrag,
-    NoGravity,
-    SteadyDrive,
-    TwoSpeedDrive,
-    UnbalancedCage,
-    cylinder_drag,
-)
+from rbdyn.dynamics.forces import bodies
 from rbdyn.dynamics.forces.cage import (
     DryContact,
     Impacts,
@@ -63,7 +43,6 @@ from rbdyn.scene.lubricant import RHEOLOGIES
 
 if TYPE_CHECKING:
     from rbdyn.contact.rheology import Rheology
-    from rbdyn.dynamics.forces.bodies import SupportedRing
     from rbdyn.dynamics.forces.schedule import ClockedDrive
 
 
@@ -250,7 +229,7 @@ def roller_bearing(scene: Scene) -> RollerBearing:
         samples=NoRaceSamples(),
     )
     bearing = bearing._replace(samples=_race_samples(scene, bearing))
-    if not isinstance(bearing.open_film, LayerFilm):
+    if not isinstance(bearing.open_film, resistance.LayerFilm):
         return bearing
     # The loads that lay the oil do not depend on its film.
     return bearing._replace(open_film=_open_film(scene, scene.oil("inner"), oil_layer(scene, bearing)))
@@ -287,7 +266,9 @@ def _oil_layer(scene: Scene, bearing: RollerBearing) -> float:
     load, contact, film = float(inner[inner > 0.0].mean()), rolling_contacts(scene)["inner"], 0.0
     if contact.entrainment_speed > ROLLING:
         film = float(film_thickness.film_in_service(contact, scene.oil("inner"), load, distance))
-    return film + gap_ahead(distance) * float(film_thickness.half_width(contact, load)) ** 2 / (2.0 * contact.radius)
+    return film + resistance.gap_ahead(distance) * float(film_thickness.half_width(contact, load)) ** 2 / (
+        2.0 * contact.radius
+    )
 
 
 def _modulus(scene: Scene, first: str, second: str) -> float:
@@ -402,11 +383,13 @@ def _hunt_crossley(alpha: float) -> NoDamping | HuntCrossleyDamping:
 
 def _rolling_reduction(scene: Scene, oil: Oil) -> float:
     """Heating of the inlet times the scene's factor. The entrainment speed varies little: it is the kinematic one."""
-    heating = aihara_thermal_factor(oil.viscosity_slope, oil.conductivity, abs(scene.geometry.motion.entrainment))
+    heating = resistance.aihara_thermal_factor(
+        oil.viscosity_slope, oil.conductivity, abs(scene.geometry.motion.entrainment)
+    )
     return heating * scene.model.rolling_resistance_factor
 
 
-def _open_film(scene: Scene, oil: Oil, layer: float = 0.0) -> NoOpenFilm | OpenFilm | LayerFilm:
+def _open_film(scene: Scene, oil: Oil, layer: float = 0.0) -> NoOpenFilm | resistance.OpenFilm | resistance.LayerFilm:
     """Film of the inner race and a roller that does not touch it, fed by an oil ``layer`` [m] unless the races are flooded."""
     if not scene.model.open_contact_film:
         return NoOpenFilm()
@@ -414,23 +397,25 @@ def _open_film(scene: Scene, oil: Oil, layer: float = 0.0) -> NoOpenFilm | OpenF
     stiffness = palmgren(_modulus(scene, "roller", "rings"), length).stiffness
     roughness = math.hypot(lubricant.roller_roughness, lubricant.race_roughness)
     speed = abs(scene.geometry.motion.entrainment)
-    touching = touching_gap(oil.viscosity, radius, length, speed, stiffness, roughness)
+    touching = resistance.touching_gap(oil.viscosity, radius, length, speed, stiffness, roughness)
     reduction = _rolling_reduction(scene, oil)
     fed = None if lubricant.inlet_distance is None else layer
-    return open_film(oil.viscosity, radius, length, reduction, touching, fed)
+    return resistance.open_film(oil.viscosity, radius, length, reduction, touching, fed)
 
 
 def rolling_law(scene: Scene, oil: Oil, reduced_radius: float) -> Any:
     """Rolling resistance of a race contact of this reduced radius [m]."""
     if scene.model.rolling_resistance == "off":
-        return NoRollingResistance()
+        return resistance.NoRollingResistance()
     reduction = _rolling_reduction(scene, oil)
     modulus, length = _modulus(scene, "roller", "rings"), scene.bearing.effective_length
-    flooded = biboulet_houpert(oil.viscosity, modulus, reduced_radius, length, reduction)
+    flooded = resistance.biboulet_houpert(oil.viscosity, modulus, reduced_radius, length, reduction)
     distance = scene.lubricant.inlet_distance
     if distance is None:
         return flooded
-    return starved(flooded, oil.viscosity, oil.pressure_coefficient, modulus, reduced_radius, length, distance)
+    return resistance.starved(
+        flooded, oil.viscosity, oil.pressure_coefficient, modulus, reduced_radius, length, distance
+    )
 
 
 def _pocket(scene: Scene, oil: Oil) -> Any:
@@ -527,38 +512,38 @@ def _guide(scene: Scene, oil: Oil) -> NoGuide | OuterGuide | InnerGuide:
 def _drag(scene: Scene, oil: Oil) -> Any:
     laws, drawing = scene.model, scene.bearing
     if laws.drag == "off" or laws.drag_coefficient == 0.0:
-        return NoDrag()
+        return bodies.NoDrag()
     sizes, fraction = (drawing.roller_diameter, drawing.roller_length), scene.lubricant.oil_fraction
-    return cylinder_drag(oil.density, fraction, laws.drag_coefficient, *sizes)
+    return bodies.cylinder_drag(oil.density, fraction, laws.drag_coefficient, *sizes)
 
 
-def _cage(scene: Scene) -> BalancedCage | UnbalancedCage:
+def _cage(scene: Scene) -> bodies.BalancedCage | bodies.UnbalancedCage:
     cage, inertia = scene.cage, scene.geometry.cage_inertia
     if cage.imbalance == 0.0:
-        return BalancedCage(cage.mass, inertia)
-    return UnbalancedCage(cage.mass, inertia, cage.imbalance)
+        return bodies.BalancedCage(cage.mass, inertia)
+    return bodies.UnbalancedCage(cage.mass, inertia, cage.imbalance)
 
 
-def _outer_ring(scene: Scene) -> "HeldRing | SupportedRing":
+def _outer_ring(scene: Scene) -> bodies.HeldRing | bodies.SupportedRing:
     support, start = scene.support, layout_of(scene).support
     if support is None or start is None:
-        return HeldRing()
-    from rbdyn.dynamics.forces.bodies import SupportedRing
+        return bodies.HeldRing()
+    return bodies.SupportedRing(
+        start, support.outer_ring_mass_kg, float(support.stiffness_N_m), float(support.damping_N_s_m)
+    )
 
-    return SupportedRing(start, support.outer_ring_mass_kg, float(support.stiffness_N_m), float(support.damping_N_s_m))
 
-
-def _gravity(scene: Scene) -> NoGravity | Gravity:
+def _gravity(scene: Scene) -> bodies.NoGravity | bodies.Gravity:
     size, direction = scene.operation.gravity_m_s2, scene.operation.gravity_direction
-    return Gravity(size * math.cos(direction), size * math.sin(direction)) if size > 0.0 else NoGravity()
+    return bodies.Gravity(size * math.cos(direction), size * math.sin(direction)) if size > 0.0 else bodies.NoGravity()
 
 
-def _drive(scene: Scene) -> "SteadyDrive | TwoSpeedDrive | ClockedDrive":
+def _drive(scene: Scene) -> "bodies.SteadyDrive | bodies.TwoSpeedDrive | ClockedDrive":
     operation, clock = scene.operation, layout_of(scene).clock
     inner, outer = operation.speeds
     load = float(operation.radial_load_N)
     if clock is None:
-        return SteadyDrive(inner, load) if outer == 0.0 else TwoSpeedDrive(inner, outer, load)
+        return bodies.SteadyDrive(inner, load) if outer == 0.0 else bodies.TwoSpeedDrive(inner, outer, load)
     from rbdyn.dynamics.forces.schedule import ClockedDrive
 
     return ClockedDrive(
