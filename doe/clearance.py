@@ -274,7 +274,7 @@ def attempt_text(text: str, version: str) -> RunOutcome:
     host, pid = socket.gethostname(), os.getpid()
     if code_version(SIMULATION) != version:
         raise InputError(
-            [f"worker {host}, process {pid}: runs another version of rbdyn or of its sources; install the same"]
+            f"worker {host}, process {pid}: runs another version of rbdyn or of its sources; install the same"
         )
     return replace(attempt(Scene.from_dict(json.loads(text))), host=host, pid=pid)
 

@@ -193,15 +193,13 @@ def compare(
     """
     overrides, both = list(overrides), list(both)
     if b is None and not overrides:
-        raise InputError(["B: missing; name a second scene or result, or say by --set what differs from A"])
+        raise InputError("B: missing; name a second scene or result, or say by --set what differs from A")
     names = [_name(a, "A"), ", ".join([_name(a if b is None else b, "B"), *overrides])]
     sources = [_resolved(a, both), _resolved(a if b is None else b, [*overrides, *both])]
     kinds = [_kind(source) for source in sources]
     if kinds[0] != kinds[1]:
         raise InputError(
-            [
-                f"A is a bearing with {kinds[0]} and B one with {kinds[1]}: they have no results in common; compare two of one kind"
-            ]
+            f"A is a bearing with {kinds[0]} and B one with {kinds[1]}: they have no results in common; compare two of one kind"
         )
     if isinstance(sources[0], Scene | BallScene) and sources[0] == sources[1]:
         sources = sources[:1]

@@ -336,7 +336,7 @@ def status(
         from doe.workflow.status import status_of
 
         if out is not None and out.exists() and not out.is_dir():
-            raise InputError([f"--out {out}: is a file; name the folder of the results"])
+            raise InputError(f"--out {out}: is a file; name the folder of the results")
         record = status_of(path, out)
         hand_over(lambda: record, as_json, lambda: show(status_blocks(record), Detail.of(quiet)))
 

@@ -237,7 +237,7 @@ def _class_limit(texts: Sequence[str]) -> str:
     """The limit on the class of the cage; empty without one. The check of the study reads the names of classes."""
     classes = [match[3] for text in texts if (match := LIMIT.fullmatch(text)) and match[1] == CAGE_CLASS]
     if len(classes) > 1:
-        raise InputError([f"--limit {CAGE_CLASS}: is stated {len(classes)} times; keep one of them"])
+        raise InputError(f"--limit {CAGE_CLASS}: is stated {len(classes)} times; keep one of them")
     return "\n".join(["\n[limits]", *(f"cage.verdict = {_quoted(text)}" for text in classes), ""]) if classes else ""
 
 

@@ -99,7 +99,7 @@ class Answer(Mapping[str, Any]):
             return pd.DataFrame(list(next(iter(rows.values()))))
         if name not in rows:
             shown = one_line(repr(name), LONGEST_NAME)
-            raise InputError([f"name = {shown}: is not a table of this answer; choose one of {', '.join(rows)}"])
+            raise InputError(f"name = {shown}: is not a table of this answer; choose one of {', '.join(rows)}")
         return pd.DataFrame(list(rows[name]))
 
     def __getitem__(self, key: str) -> Any:
@@ -155,7 +155,7 @@ def path_given(argument: Any, name: str) -> Path:
         return path_of(argument)
     except InputError:
         shown = one_line(repr(argument), LONGEST_NAME)
-        raise InputError([f"{name} = {shown}: must be the path of a file or a folder; check the call"]) from None
+        raise InputError(f"{name} = {shown}: must be the path of a file or a folder; check the call") from None
 
 
 def optional_path(argument: Any, name: str) -> Path | None:
@@ -183,7 +183,7 @@ def part_given(text: Any) -> tuple[int, int] | None:
     if not 1 <= part <= parts <= MOST_PARTS:
         shown = one_line(str(text), LONGEST_NAME)
         number = f"a part from 1 to {parts}" if match and 1 <= parts <= MOST_PARTS else f"K/N with N up to {MOST_PARTS}"
-        raise InputError([f"--part {shown}: this part does not exist; write {number}, such as 3/40"])
+        raise InputError(f"--part {shown}: this part does not exist; write {number}, such as 3/40")
     return part, parts
 
 

@@ -169,7 +169,7 @@ def run_answer(
     effort = Effort(workers, scheduler, retry, progress, notice)
     share = part_given(part)
     if share is not None and target is None:
-        raise InputError([f"--part {part}: needs --out DIR, the folder that all parts share"])
+        raise InputError(f"--part {part}: needs --out DIR, the folder that all parts share")
     folder = None if target is None else part_folder(target, share)
     source = content if isinstance(content, Path) else None
     with ExitStack() as stack:
@@ -177,7 +177,7 @@ def run_answer(
         scenes = read_scene_table(content, base, assignments)
         rows, digest = scenes.rows[rows_of(share)], table_digest(scenes)
         if not rows:
-            raise InputError([f"--part {part}: has no row, since the table has {len(scenes.rows)}; name fewer parts"])
+            raise InputError(f"--part {part}: has no row, since the table has {len(scenes.rows)}; name fewer parts")
         if target is not None:
             refuse_other_parts(target, digest)
         output.claim(source, *([] if base is None else [base]))

@@ -195,7 +195,7 @@ def _study_or_table(
         return Problem.load(path), ()
     if data is None:
         raise InputError(
-            ["fit: nothing to fit; give STUDY.toml, or --data TABLE.csv with --factor NAME or --response NAME"]
+            "fit: nothing to fit; give STUDY.toml, or --data TABLE.csv with --factor NAME or --response NAME"
         )
     study, notes = study_of_table(data, factors, responses, model or "quadratic")
     return Problem(study.path, study.file), notes
@@ -327,7 +327,7 @@ def _point_text(point: Any) -> str:
     if hasattr(point, "__iter__"):
         return ",".join(map(str, point))
     shown = one_line(repr(point), LONGEST_NAME)
-    raise InputError([f"point = {shown}: must be values by factor, such as {{'pocket_clearance_mm': 0.3}}, or a list"])
+    raise InputError(f"point = {shown}: must be values by factor, such as {{'pocket_clearance_mm': 0.3}}, or a list")
 
 
 def _point(study: "Problem", text: str) -> list[float]:
@@ -342,7 +342,7 @@ def _point(study: "Problem", text: str) -> list[float]:
     parts = [part.strip() for part in text.split(",")]
     by_name = any("=" in part for part in parts)
     if not by_name and len(parts) != len(study.factors):
-        raise InputError([f"--point {text}: give a value for each factor ({', '.join(study.factors)}), or name=value"])
+        raise InputError(f"--point {text}: give a value for each factor ({', '.join(study.factors)}), or name=value")
     pairs = [part.partition("=")[::2] for part in parts] if by_name else list(zip(study.factors, parts, strict=True))
     stripped = [(name.strip(), number.strip()) for name, number in pairs]
     counts = Counter(name for name, _ in stripped)

@@ -32,7 +32,7 @@ def refuse_other_parts(folder: Path, question: str) -> None:
             questions = {agenda.question for agenda, _ in agendas_of(store)}
         if questions - {question}:
             raise InputError(
-                [f"--out {folder}: {path.parent.name} is a part of another input; remove it or name another folder"]
+                f"--out {folder}: {path.parent.name} is a part of another input; remove it or name another folder"
             )
 
 

@@ -476,7 +476,7 @@ def _client(address: str) -> Iterator[Any]:
     try:
         import distributed
     except ImportError:
-        raise InputError([f"{where}: needs the package distributed; pip install 'rbdyn[cluster]'"]) from None
+        raise InputError(f"{where}: needs the package distributed; pip install 'rbdyn[cluster]'") from None
     # Errors are reported here in a sentence, not by its log.
     for name in logging.root.manager.loggerDict:
         if name.split(".")[0] == "distributed":
@@ -486,14 +486,12 @@ def _client(address: str) -> Iterator[Any]:
         client = distributed.Client(address, timeout=CONNECT_S, set_as_default=False)
     # Any server may answer at the address, with any error.
     except Exception:
-        raise InputError(
-            [f"{where}: no dask scheduler answers there within {KNOCK_S:g} s; check the address"]
-        ) from None
+        raise InputError(f"{where}: no dask scheduler answers there within {KNOCK_S:g} s; check the address") from None
     try:
         try:
             client.wait_for_workers(1, timeout=WORKERS_S)
         except TimeoutError:
-            raise InputError([f"{where}: has no workers; start some with dask worker {address}"]) from None
+            raise InputError(f"{where}: has no workers; start some with dask worker {address}") from None
         yield client
     finally:
         client.close(timeout=CONNECT_S)

@@ -129,7 +129,7 @@ class Database:
         self._lock = threading.RLock()
         self._reported: set[str] = set()
         if path.is_dir():
-            raise InputError([f"{path}: is a folder where a file of runs belongs; move it away or name another folder"])
+            raise InputError(f"{path}: is a folder where a file of runs belongs; move it away or name another folder")
         with self._faults():
             self._connection = sqlite3.connect(
                 _address(path, read_only), timeout=PATIENCE_S, isolation_level=None, check_same_thread=False, uri=True
@@ -162,15 +162,13 @@ class Database:
             version = "1"
         if version != VERSION:
             if not version:
-                raise InputError([f"{self.path}: not a store of runs; move it away or name another folder"])
+                raise InputError(f"{self.path}: not a store of runs; move it away or name another folder")
             newer = version.isdigit() and int(version) > int(VERSION)
             fix = "install the newer doe that made it" if newer else "move it away"
-            raise InputError(
-                [f"{self.path}: a store of version {version}, not {VERSION}; {fix} or name another folder"]
-            )
+            raise InputError(f"{self.path}: a store of version {version}, not {VERSION}; {fix} or name another folder")
         (sound,) = self._connection.execute("PRAGMA quick_check(1)").fetchone()
         if sound != "ok":
-            raise InputError([f"{self.path}: damaged ({sound}); move it away, its runs are then run again"])
+            raise InputError(f"{self.path}: damaged ({sound}); move it away, its runs are then run again")
         if not read_only:
             _patiently(self._connection, "PRAGMA journal_mode=WAL")
 
@@ -208,7 +206,7 @@ class Database:
                 cause = f"{self.path}: cannot be written ({error})"
                 raise StoppedError(cause, "free space on the disk and start again") from None
             fix = FIXES.get(getattr(error, "sqlite_errorcode", 0) & 0xFF, "move it away")
-            raise InputError([f"{self.path}: cannot be used as a store of runs ({error}); {fix}"]) from None
+            raise InputError(f"{self.path}: cannot be used as a store of runs ({error}); {fix}") from None
 
 
 def _address(path: Path, read_only: bool) -> str:
@@ -292,7 +290,7 @@ class Store(Database):
             token = seize_lock(self.path.parent)
         if token is None:
             raise InputError(
-                [f"{self.path}: {self._holder()} works on it; wait until it has ended, or name another folder"]
+                f"{self.path}: {self._holder()} works on it; wait until it has ended, or name another folder"
             )
         self._token = token
         if self._meta("lock") == token:

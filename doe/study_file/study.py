@@ -312,10 +312,8 @@ class Study:
         """Scene of the runs. Raises InputError for a study without one."""
         if self.file.scene is None:
             raise InputError(
-                [
-                    f"{self.path}: scene: missing; add [scene] with its file, or give fit or front the runs by --data "
-                    "TABLE.csv"
-                ]
+                f"{self.path}: scene: missing; add [scene] with its file, or give fit or front the runs by --data "
+                "TABLE.csv"
             )
         return self.file.scene
 
@@ -383,7 +381,7 @@ class Study:
         half = chain.half_width_mm if chain.half_width_mm is not None else half_width
         if half is None:
             raise InputError(
-                [f"chain {chain.name}: half_width_mm: missing, and no tolerance of {chain.factor} is known; add it"]
+                f"chain {chain.name}: half_width_mm: missing, and no tolerance of {chain.factor} is known; add it"
             )
         limits = {"lower_mm": value - half, "upper_mm": value + half}
         if chain.file is not None:
@@ -399,7 +397,7 @@ class Study:
         for chain in chains if isinstance(chains, list) else []:
             if isinstance(chain, dict) and chain.get("name") == name:
                 return chain
-        raise InputError([f"{self.path_of(file)}: no chain is named {name}; name it [[chain]] name = {name!r}"])
+        raise InputError(f"{self.path_of(file)}: no chain is named {name}; name it [[chain]] name = {name!r}")
 
 
 # Beginning of a text that is nearly a number.
@@ -426,7 +424,7 @@ def study_of_table(path: Path, factors: list[str], responses: list[str], model: 
         if name not in sheet
     )
     if not factors and not responses:
-        raise InputError([f"{path}: name its factors by --factor NAME and its responses by --response NAME; {has}"])
+        raise InputError(f"{path}: name its factors by --factor NAME and its responses by --response NAME; {has}")
     notes = list[Note]()
     if not factors or not responses:
         numbers, notes = _rest(sheet, {*factors, *responses}, responses)
@@ -435,7 +433,7 @@ def study_of_table(path: Path, factors: list[str], responses: list[str], model: 
         raise InputError([*notes, f"{path}: has no further column of numbers; {has}"])
     for kind, names, limit in (("factor", factors, MOST_FACTORS), ("response", responses, MOST_UNNAMED)):
         if len(names) > limit:
-            raise InputError([f"{path}: has {len(names)} columns for {kind}s; name {limit} at most by --{kind} NAME"])
+            raise InputError(f"{path}: has {len(names)} columns for {kind}s; name {limit} at most by --{kind} NAME")
     actual = table_of(sheet, factors, responses, path).actual
     low, high = actual.min(axis=0), actual.max(axis=0)
     constants = [(factors[place], low[place]) for place in np.flatnonzero(low == high).tolist()]

@@ -104,7 +104,7 @@ def table_of(sheet: InputTable, factors: list[str], responses: list[str], named_
     size = len(columns[factors[0]])
     if size > MOST_RUNS:
         raise InputError(
-            [f"{path}: has {size} runs; give {MOST_RUNS} at most, or number replicates alike in a column run"]
+            f"{path}: has {size} runs; give {MOST_RUNS} at most, or number replicates alike in a column run"
         )
     return Table(
         actual=np.column_stack([columns[name] for name in factors]),

@@ -106,7 +106,7 @@ def check_adaptive(study: Problem) -> None:
     try:
         check_budget(plan_of(study), len(study.design.coded))
     except MethodError as error:
-        raise InputError([f"{study.path}: adaptive.{error}"]) from None
+        raise InputError(f"{study.path}: adaptive.{error}") from None
 
 
 def plan_of(study: Problem) -> Plan:
@@ -137,7 +137,7 @@ def find_adaptive(study: Problem, runs: Runs, simulations: Simulations) -> Adapt
             if evaluator.failures:
                 causes = "; ".join(group.cause for group in grouped(evaluator.failures))
                 raise RunError(f"adaptive front: {error} ({causes})") from None
-            raise InputError([f"{study.path}: adaptive.{error}"]) from None
+            raise InputError(f"{study.path}: adaptive.{error}") from None
     ends = np.column_stack([search.region.low, search.region.high])
     edges = study.centre[:, None] + step[:, None] * ends
     front = replace(search.front, searched=_samples_about_finalists(study, search))

@@ -53,7 +53,7 @@ def design_of(study: Study) -> Design:
     try:
         design = _design(settings.model_dump_json(exclude_unset=True), len(study.factors), basis)
     except MethodError as error:
-        raise InputError([f"{study.path}: design.{error}"]) from None
+        raise InputError(f"{study.path}: design.{error}") from None
     return replace(design, coded=realised(study, design.coded, design.reach))
 
 

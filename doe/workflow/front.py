@@ -161,7 +161,7 @@ def named_faults(study: Problem, actual: Callable[[Array], Array], suffix: str) 
     except InfeasibleError as error:
         raise out_of_reach(study, actual(error.point), error.violations, suffix) from None
     except MethodError as error:
-        raise InputError([f"{study.path}: front{suffix}: {error}"]) from None
+        raise InputError(f"{study.path}: front{suffix}: {error}") from None
 
 
 class OutOfReachError(InputError):
@@ -204,7 +204,7 @@ def check_goals(study: Problem) -> None:
     if len(study.goals.objectives) < 2:
         limited = [study.responses[index] for index in dict.fromkeys(index for index, _, _ in study.goals.limited)]
         hint = f'; {", ".join(limited)} may be one: write goal = "min" with its limit' if limited else ""
-        raise InputError([f"{study.path}: response: a front needs two responses with a goal; add a second one{hint}"])
+        raise InputError(f"{study.path}: response: a front needs two responses with a goal; add a second one{hint}")
     tolerance_box(study)
 
 

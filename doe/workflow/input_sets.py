@@ -276,7 +276,7 @@ def case_of(
     inputs = inputs_of(case.scene_of_sets, case.tables(), uncertain, fixed, columns, str(home))
     if not inputs:
         fix = "name keys as \"table.key\" = {law = ...} or leave out defaults = 'none'"
-        raise InputError([f"{home}: uncertain: nothing is unknown; {fix}"])
+        raise InputError(f"{home}: uncertain: nothing is unknown; {fix}")
     keys = {unknown_input.key for unknown_input in inputs}
     inputs_without_set = inputs_of(case.scene_of_sets, plain, uncertain, fixed, columns)
     by_set = [unknown_input.key for unknown_input in inputs_without_set if unknown_input.key not in keys]
@@ -325,7 +325,7 @@ def read_sample(path: Path, declared: Mapping[str, Law]) -> dict[str, list[Any]]
     sheet.refuse_nameless()
     refuse(f"{path}: {fault}" for fault in unknown_keys(sheet.places))
     if len(sheet.rows) < 2:
-        raise InputError([f"{path}: has one row; a sample needs two at least"])
+        raise InputError(f"{path}: has one row; a sample needs two at least")
     columns, faults = dict[str, list[Any]](), list[str]()
     for key in sheet.places:
         choices = declared[key].values if key in declared else None

@@ -181,7 +181,7 @@ def _grades(group: ClearanceParts, part: Part) -> dict[str, float]:
         return grade_tolerances(part.nominal)
     except MethodError as error:
         why = f"{part.name} of {part.nominal:g} mm {error}"
-        raise InputError([f"{group.factor}: {why}; leave --tolerances and --chains out"]) from None
+        raise InputError(f"{group.factor}: {why}; leave --tolerances and --chains out") from None
 
 
 class PartWidth(Record):

@@ -410,7 +410,7 @@ def _lost_note(study: Problem, taken: Taken, heat: Heat) -> Note:
     if any(running.seizes for _, running in _running(study, study.centre, heat) if running.key == key):
         fix = "widen the factor's centre" if stays else f"widen it in {study.scene.file}, or make it a factor"
         raise InputError(
-            [f"{study.path}: {key} = {1e3 * running.play.drawn:g}: {taken.at}{taken.causes}: the cage seizes; {fix}"]
+            f"{study.path}: {key} = {1e3 * running.play.drawn:g}: {taken.at}{taken.causes}: the cage seizes; {fix}"
         )
     why = "runs of a table keep its region where it is" if stays else "no factor moves it"
     return Note(

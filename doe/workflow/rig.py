@@ -78,7 +78,7 @@ def read_rig(path: Path) -> Rig:
     sheet = read_sheet(path)
     keys, outputs = _keys_and_outputs(sheet)
     if len(sheet.rows) > MOST_ROWS:
-        raise InputError([f"{path}: has {len(sheet.rows)} rows; give {MOST_ROWS} at most, such as means of alike ones"])
+        raise InputError(f"{path}: has {len(sheet.rows)} rows; give {MOST_ROWS} at most, such as means of alike ones")
     cells, faults = _cells(sheet, keys)
     accuracies, slips = _accuracies(cells, outputs)
     faults += [fault for place in range(len(sheet.rows)) for fault in _faults(cells, place, outputs)]
@@ -91,7 +91,7 @@ def read_rig(path: Path) -> Rig:
     gaps = {name: np.array([row.values.get(name, math.nan) for row in rows]) for name in outputs if name in sheet}
     rig = Rig(path, rows, keys, outputs, accuracies, (*sheet.notes, *gap_notes(path, gaps)))
     if len(rig.conditions) > MOST_CONDITIONS:
-        raise InputError([f"{path}: has {len(rig.conditions)} operating conditions; give {MOST_CONDITIONS} at most"])
+        raise InputError(f"{path}: has {len(rig.conditions)} operating conditions; give {MOST_CONDITIONS} at most")
     return rig
 
 

@@ -409,10 +409,8 @@ def case_of_study(study: Problem) -> Case:
         others = [text for text in declared_runs.set if key_path(text) != ("numerics", "turns")]
         if "set" in declared_runs.model_fields_set and len(others) < len(declared_runs.set):
             raise InputError(
-                [
-                    f"{case.home}: uncertain.set: input sets of {sets.cage_turns:.3g} cage turns are shorter than the {BLOCK_TURNS} that "
-                    "limits.cage.verdict needs; set numerics.turns there to more"
-                ]
+                f"{case.home}: uncertain.set: input sets of {sets.cage_turns:.3g} cage turns are shorter than the {BLOCK_TURNS} that "
+                "limits.cage.verdict needs; set numerics.turns there to more"
             )
         turns = math.ceil(sets.numerics.turns * BLOCK_TURNS / sets.cage_turns)
         longer = declared_runs.model_copy(update={"set": [*others, f"numerics.turns={turns}"]})

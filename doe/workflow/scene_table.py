@@ -80,16 +80,16 @@ class SceneTable:
         refuse(row.faults)
         if row.file is not None and row.designation:
             raise InputError(
-                [f"{source}: has a {SCENE} and a {DESIGNATION}, which both state the bearing; keep one of them"]
+                f"{source}: has a {SCENE} and a {DESIGNATION}, which both state the bearing; keep one of them"
             )
         file = row.designation or row.file or self.base
         if file is None:
             fix = f"name one in its column {SCENE}, a bearing in {DESIGNATION}, or a scene for all rows by --scene"
-            raise InputError([f"{source}: has no scene; {fix}"])
+            raise InputError(f"{source}: has no scene; {fix}")
         tables = deepcopy(_tables(file))
         bearing = tables.get("bearing")
         if isinstance(bearing, dict) and bearing.get("kind") in BALL_KINDS:
-            raise InputError([f"{source}: {file}: is a ball bearing; rbdyn ball computes it, doe run takes rollers"])
+            raise InputError(f"{source}: {file}: is a ball bearing; rbdyn ball computes it, doe run takes rollers")
         for assignment in self.overrides:
             set_key(tables, assignment)
         for key, value in row.values.items():

@@ -288,11 +288,11 @@ def folder_of(path: Path, *usual: str) -> Path:
     """
     running = folders_of(path)
     if len(running) > 1:
-        raise InputError([f"{path}: runs in {' and in '.join(map(str, running))}; name one of them by --out"])
+        raise InputError(f"{path}: runs in {' and in '.join(map(str, running))}; name one of them by --out")
     folders = [Path(pattern.format(path.stem)) for pattern in usual]
     stores = running or [folder for folder in folders if (folder / STORE).exists()]
     if len(stores) > 1:
-        raise InputError([f"{path}: has runs in {' and in '.join(map(str, stores))}; name one of them by --out"])
+        raise InputError(f"{path}: has runs in {' and in '.join(map(str, stores))}; name one of them by --out")
     return stores[0] if stores else folders[0]
 
 

@@ -169,7 +169,7 @@ def reference_runs(study: Problem) -> Runs | None:
         distance = [float(np.abs(table.coded[row] - point).max()) for row in rows]
         if not distance or min(distance) > 0.02:
             raise InputError(
-                [f"{path}: no run left for the design point {point.round(3).tolist()} (coded); fix the reference"]
+                f"{path}: no run left for the design point {point.round(3).tolist()} (coded); fix the reference"
             )
         order.append(rows.pop(int(np.argmin(distance))))
     values, errors = np.full((2, len(order), len(study.responses)), np.nan)

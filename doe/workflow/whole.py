@@ -515,7 +515,7 @@ def run_part(
     points = points_of(scenes, labels)
     works = {point.key: work_of(scene) for point, scene in zip(points, every_scene(scenes), strict=True)}
     if not works:
-        raise InputError([f"--part {part[0]}/{part[1]}: has no run of {len(ordered.scenes)}; name fewer parts"])
+        raise InputError(f"--part {part[0]}/{part[1]}: has no run of {len(ordered.scenes)}; name fewer parts")
     agenda.plan([Stage(DESIGN, (DESIGN,), len(works), sum(works.values()))])
     with effort.simulations(folder, study.path, agenda) as simulations:
         return simulations.run(scenes, labels, simulations.progress(DESIGN), ordered.factors[rows])

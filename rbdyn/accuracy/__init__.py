@@ -59,7 +59,7 @@ def study_name(name: str | None, scene: Scene | BallScene) -> str:
     homes = BALL_STUDIES if isinstance(scene, BallScene) else STUDIES
     if name is not None and name not in homes:
         names = " or ".join(homes)
-        raise InputError([f"{name}: is not a study of a bearing of kind {scene.bearing.kind!r}; choose {names}"])
+        raise InputError(f"{name}: is not a study of a bearing of kind {scene.bearing.kind!r}; choose {names}")
     return name or next(iter(homes))
 
 

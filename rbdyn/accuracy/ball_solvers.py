@@ -58,7 +58,7 @@ class Attempt(Record):
 def study(scene: BallScene, progress: Reporter = None, limits: Sequence[int] = LIMITS) -> Report:
     """``rbdyn accuracy SCENE methods`` of a ball bearing. Raises InputError for two rows, RunError where there is no equilibrium."""
     if not isinstance(scene, SingleRowScene):
-        raise InputError([f"bearing.kind = {scene.bearing.kind!r}: has no study of its solver; take one of its rows"])
+        raise InputError(f"bearing.kind = {scene.bearing.kind!r}: has no study of its solver; take one of its rows")
     attempts = work_precision(problem_of(scene), limits, Progress(progress, len(limits)))
     written = records(attempts)
     last = _until_solved(attempts)[-1]

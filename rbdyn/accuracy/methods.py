@@ -274,7 +274,7 @@ def starts_after_transient(scene: Scene, turns: float = DEFAULT_TURNS, starts: i
     Raises InputError for turns outside (0, 1], RunError.
     """
     if not 0.0 < turns <= LONGEST_TURNS:
-        raise InputError([f"turns = {turns:g}: past a turn no reference holds; give more than 0 and at most 1"])
+        raise InputError(f"turns = {turns:g}: past a turn no reference holds; give more than 0 and at most 1")
     bearing = roller_bearing(scene)
     scale = absolute_tolerance(scene, bearing, 1.0)
     # The clock runs exactly in every method; its scale only has to be a number.

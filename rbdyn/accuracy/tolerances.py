@@ -67,9 +67,7 @@ def overall(verdicts: Iterable[Verdict]) -> Verdict:
 def check_replicates(scene: Scene) -> None:
     """Raises InputError for a single replicate, whose mean has no error here."""
     if scene.numerics.replicates < 2:
-        raise InputError(
-            ["numerics.replicates = 1: the study compares means over replicates; give at least 2, better 8"]
-        )
+        raise InputError("numerics.replicates = 1: the study compares means over replicates; give at least 2, better 8")
 
 
 def turns_needed(error: float, turns: float, margin: float = MARGIN) -> float:

@@ -110,9 +110,9 @@ def check_out(path: Path | None, force: bool, reads: Sequence[Path]) -> None:
         from rbdyn.base.files import place_of_file
 
         if path.is_file() and not force:
-            raise InputError([f"--out {path}: exists; add --force to write over it, or name another file"])
+            raise InputError(f"--out {path}: exists; add --force to write over it, or name another file")
         if any(path.exists() and path.samefile(read) for read in reads):
-            raise InputError([f"--out {path}: is a file that this command reads; name another file"])
+            raise InputError(f"--out {path}: is a file that this command reads; name another file")
         place_of_file(path)
 
 

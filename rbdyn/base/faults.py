@@ -114,8 +114,8 @@ class InputError(Exception):
     Of more than `MOST_FAULTS` it holds the first ones and the number of the others.
     """
 
-    def __init__(self, faults: Iterable[str]) -> None:
-        sentences = list(faults)
+    def __init__(self, faults: str | Iterable[str]) -> None:
+        sentences = [faults] if isinstance(faults, str) else list(faults)
         if len(sentences) > MOST_FAULTS:
             more = len(sentences) - MOST_FAULTS + 1
             sentences = [*sentences[: MOST_FAULTS - 1], f"and {more} more faults; fix these first"]
@@ -204,7 +204,7 @@ def path_of(argument: Any) -> Path:
     """The argument of a call as a path. Raises InputError where it is none."""
     if isinstance(argument, str | PathLike):
         return Path(argument)
-    raise InputError([f"path = {one_line(repr(argument), LONGEST_NAME)}: must be the path of a file; check the call"])
+    raise InputError(f"path = {one_line(repr(argument), LONGEST_NAME)}: must be the path of a file; check the call")
 
 
 # Device and number of each file that a command has read; content of the pipes among them, which can be read only once.
@@ -248,12 +248,12 @@ def read_bytes(path: Path) -> bytes:
         if stat.S_ISFIFO(status.st_mode):
             _pipes[place] = data
     except FileNotFoundError:
-        raise InputError([f"{path}: no such file; check the path"]) from None
+        raise InputError(f"{path}: no such file; check the path") from None
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
-        raise InputError([f"{path}: cannot be read ({reason}); check the path"]) from None
+        raise InputError(f"{path}: cannot be read ({reason}); check the path") from None
     if len(data) > LARGEST_FILE:
-        raise InputError([f"{path}: larger than {LARGEST_FILE / 1e6:g} MB; check that it is the right file"])
+        raise InputError(f"{path}: larger than {LARGEST_FILE / 1e6:g} MB; check that it is the right file")
     return data
 
 
@@ -269,7 +269,7 @@ def read_text(path: Path) -> str:
 def not_utf_8(path: Path, data: bytes, error: UnicodeDecodeError) -> InputError:
     """The fault of a file that is no UTF-8, with the first such byte."""
     line, byte = data.count(b"\n", 0, error.start) + 1, error.object[error.start]
-    return InputError([f"{path}: cannot be read (line {line}: byte 0x{byte:02x} is not UTF-8); save the file as UTF-8"])
+    return InputError(f"{path}: cannot be read (line {line}: byte 0x{byte:02x} is not UTF-8); save the file as UTF-8")
 
 
 def read_toml(path: Path | str) -> dict[str, Any]:
@@ -279,7 +279,7 @@ def read_toml(path: Path | str) -> dict[str, Any]:
         return _parsed(read_text(path), str(path))
     except tomllib.TOMLDecodeError as error:
         fix = "a key or table is there twice; remove one" if str(error).startswith("Cannot") else "fix that line"
-        raise InputError([f"{path}: not valid TOML ({error}); {fix}"]) from None
+        raise InputError(f"{path}: not valid TOML ({error}); {fix}") from None
 
 
 def check_bounds(data: dict[str, Any], source: str) -> dict[str, Any]:
@@ -288,7 +288,7 @@ def check_bounds(data: dict[str, Any], source: str) -> dict[str, Any]:
     faults = []
     for place, value in waiting:
         if len(place) > DEEPEST:
-            raise InputError([f"{source}: {_dotted(place[:3])}...: nested more than {DEEPEST} deep; fix the brackets"])
+            raise InputError(f"{source}: {_dotted(place[:3])}...: nested more than {DEEPEST} deep; fix the brackets")
         if isinstance(value, Mapping):
             waiting += [((*place, key), item) for key, item in value.items()]
         elif isinstance(value, list):
@@ -306,11 +306,11 @@ def _parsed(text: str, source: str) -> dict[str, Any]:
         (DIGITS, "a number of thousands of digits; take a smaller one"),
     ):
         if absurd := pattern.search(text):
-            raise InputError([f"{source}: line {text.count(chr(10), 0, absurd.start()) + 1}: {fault}"])
+            raise InputError(f"{source}: line {text.count(chr(10), 0, absurd.start()) + 1}: {fault}")
     try:
         return check_bounds(tomllib.loads(text), source)
     except RecursionError:
-        raise InputError([f"{source}: brackets nested more than {DEEPEST} deep; fix them"]) from None
+        raise InputError(f"{source}: brackets nested more than {DEEPEST} deep; fix them") from None
 
 
 def validated(model: type[Model], data: Mapping[str, Any], source: str) -> Model:
@@ -374,13 +374,13 @@ def set_key(data: dict[str, Any], assignment: str, name: str = "--set") -> None:
     path, sign, text = assignment.partition("=")
     source = f"{name} {one_line(assignment, 2 * LONGEST_NAME)}"
     if not sign:
-        raise InputError([f"{source}: write it as key.path=value"])
+        raise InputError(f"{source}: write it as key.path=value")
     try:
         parsed = _parsed(f"value = {text}", source)
     except tomllib.TOMLDecodeError:
         parsed = {"value": text.strip()}
     if len(parsed) > 1:
-        raise InputError([f"{source}: more than one value; write one assignment for each key"])
+        raise InputError(f"{source}: more than one value; write one assignment for each key")
     put_key(data, path, parsed["value"], source)
 
 
@@ -388,12 +388,12 @@ def put_key(data: dict[str, Any], path: str, value: Any, source: str) -> None:
     """Put a value under a dotted ``path`` of nested tables. Raises InputError for an invalid path or one through a value."""
     keys = _parts(path)
     if not keys:
-        raise InputError([f"{source}: write it as key.path=value"])
+        raise InputError(f"{source}: write it as key.path=value")
     table = data
     for key in keys[:-1]:
         table = table.setdefault(key, {})
         if not isinstance(table, dict):
-            raise InputError([f"{source}: {one_line(key, LONGEST_NAME)} is a value, not a table; check the key path"])
+            raise InputError(f"{source}: {one_line(key, LONGEST_NAME)} is a value, not a table; check the key path")
     table[keys[-1]] = value
 
 
@@ -567,7 +567,7 @@ def axis_values(text: str, option: str) -> list[float]:
     fix = "write start:stop:count or values with commas, rising"
     values = number_list(text, f"{option} {text}", fix, 0, MOST_VALUES)
     if not values or not all(map(math.isfinite, values)) or any(b <= a for a, b in pairwise(values)):
-        raise InputError([f"{option} {text}: the values must rise; {fix}"])
+        raise InputError(f"{option} {text}: the values must rise; {fix}")
     return values
 
 
@@ -578,11 +578,11 @@ def number_list(text: str, name: str, fix: str, fewest: int, most: int) -> list[
             return [float(value) for value in text.split(",")]
         start, stop, count = text.split(":")
         if int(count) > most:
-            raise InputError([f"{name}: {count} values are more than the {most} that memory has room for; take fewer"])
+            raise InputError(f"{name}: {count} values are more than the {most} that memory has room for; take fewer")
         if int(count) >= fewest:
             import numpy as np
 
             return [float(value) for value in np.linspace(float(start), float(stop), int(count))]
     except ValueError:
         pass
-    raise InputError([f"{name}: not a list of numbers; {fix}"])
+    raise InputError(f"{name}: not a list of numbers; {fix}")

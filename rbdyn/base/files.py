@@ -28,7 +28,7 @@ def read_record(path: Path | str, form: str, what: str, restore: Callable[[dict[
     Raises InputError when the file is missing, has another format or is not whole.
     """
     if not path_of(path).is_file():
-        raise InputError([f"{path}: cannot be read (no such file); check the path"])
+        raise InputError(f"{path}: cannot be read (no such file); check the path")
     text = read_text(Path(path))
     try:
         data = json.loads(text)
@@ -38,13 +38,13 @@ def read_record(path: Path | str, form: str, what: str, restore: Callable[[dict[
     if saved != form:
         same = isinstance(saved, str) and saved.partition("/")[0] == form.partition("/")[0]
         if not isinstance(saved, str):
-            raise InputError([f"{path}: not a saved {what}; check the path"])
+            raise InputError(f"{path}: not a saved {what}; check the path")
         fix = "run the scene again" if same else f"name a saved {what}"
-        raise InputError([f"{path}: format is {saved}, not {form}; {fix}"])
+        raise InputError(f"{path}: format is {saved}, not {form}; {fix}")
     try:
         return restore(check_bounds(data, str(path)))
     except (AttributeError, KeyError, TypeError, ValueError):
-        raise InputError([f"{path}: not a whole {what}; run the scene again"]) from None
+        raise InputError(f"{path}: not a whole {what}; run the scene again") from None
 
 
 def read_json(path: Path | str) -> Any:
@@ -69,9 +69,9 @@ def place_of_file(path: Path | str) -> Path:
     """The path of a file to write. Raises InputError where no file can be."""
     path = path_of(path)
     if path.is_dir() or not path.name:
-        raise InputError([f"{path}: is a folder; name a file in it"])
+        raise InputError(f"{path}: is a folder; name a file in it")
     if not path.parent.is_dir():
-        raise InputError([f"{path}: missing folder {path.parent}; make it first"])
+        raise InputError(f"{path}: missing folder {path.parent}; make it first")
     return path
 
 

@@ -72,7 +72,7 @@ class OutputFolder:
             path.mkdir(parents=True, exist_ok=True)
             if seize_lock(path, alone=True) is None:
                 raise InputError(
-                    [f"--out {path}: {self._holder(path)} works in it; wait until it has ended, or name another folder"]
+                    f"--out {path}: {self._holder(path)} works in it; wait until it has ended, or name another folder"
                 )
             self._locked = True
             earlier = self._check(path, owner)
@@ -82,7 +82,7 @@ class OutputFolder:
             write_json(path / MARK, self._mark)
         except (OSError, sqlite3.Error) as error:
             reason = getattr(error, "strerror", None) or error
-            raise InputError([f"--out {path}: cannot be written to ({reason}); name another folder"]) from None
+            raise InputError(f"--out {path}: cannot be written to ({reason}); name another folder") from None
 
     def write(self, make: Callable[[Path], T], last: str = "") -> T:
         """Let ``make`` write files into a folder, and move them into this one; returns what ``make`` returns.
@@ -150,15 +150,13 @@ class OutputFolder:
         except (OSError, ValueError, KeyError, TypeError):
             if not self._force:
                 raise InputError(
-                    [f"--out {path}: its {MARK} cannot be read; name another folder, remove this one or add --force"]
+                    f"--out {path}: its {MARK} cannot be read; name another folder, remove this one or add --force"
                 ) from None
         if earlier and entries.keys() - OWN and not self._force and not _same_owner(owner, earlier):
             source = os.path.normpath(path / earlier["file"]) if earlier["file"] else "another input"
             raise InputError(
-                [
-                    f"--out {path}: holds results of {earlier['command']} from {source}; "
-                    "name another folder or remove this one"
-                ]
+                f"--out {path}: holds results of {earlier['command']} from {source}; "
+                "name another folder or remove this one"
             )
         refuse(self._conflicts(path, entries.values(), _lists(earlier)))
         return earlier

@@ -246,17 +246,17 @@ def slip_map(
     (along, columns), (up, rows) = swept.items()
     if (along, up) != AXES and (stiffness or duty):
         raise InputError(
-            [f"--sweep {' '.join(sweep or [])}: --stiffness and --duty need a map over --speed and --load; state these"]
+            f"--sweep {' '.join(sweep or [])}: --stiffness and --duty need a map over --speed and --load; state these"
         )
     if stiffness:
         if duty is not None:
-            raise InputError([f"--duty {duty}: marks points of a map of cage slip; leave it or --stiffness out"])
+            raise InputError(f"--duty {duty}: marks points of a map of cage slip; leave it or --stiffness out")
         from rbdyn.cli.stiffness import over_speed
 
         chosen = Scene.load(scene, _with_numerics(assignments, turns=turns, replicates=replicates, seed=seed))
         return over_speed(console, scene, chosen, (columns, rows), load_angle, loss_factor, workers)
     if load_angle or loss_factor:
-        raise InputError(["--load-angle, --loss-factor: belong to --stiffness; state that too, or leave them out"])
+        raise InputError("--load-angle, --loss-factor: belong to --stiffness; state that too, or leave them out")
     loaded = _rollers(scene, assignments, turns=turns, replicates=replicates, seed=seed)
     from rbdyn.dynamics.slip_map import slip_map as run_map
 
@@ -286,7 +286,7 @@ def _map_axes(speed: str | None, load: str | None, others: Sequence[str]) -> dic
     stated += [(AXES[1], load, "--load")] if load is not None else []
     if len({key for key, *_ in stated}) != 2 or len(stated) != 2:
         raise InputError(
-            [f"--speed, --load, --sweep: a map has two axes, and {len(stated)} are stated; state two different ones"]
+            f"--speed, --load, --sweep: a map has two axes, and {len(stated)} are stated; state two different ones"
         )
     stated.sort(key=lambda entry: (entry[0] == AXES[1]) - (entry[0] == AXES[0]))
     return {key: axis_values(values, option) for key, values, option in stated}
@@ -327,7 +327,7 @@ def _aim(target: str, turns: float | None, replicates: int | None) -> float:
     from rbdyn.dynamics.target import target_of
 
     if turns is not None or replicates is not None:
-        raise InputError([f"--target {target}: chooses turns and replicates itself; drop --turns and --replicates"])
+        raise InputError(f"--target {target}: chooses turns and replicates itself; drop --turns and --replicates")
     return target_of(target)
 
 

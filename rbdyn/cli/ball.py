@@ -102,9 +102,9 @@ def _requested(sweeps: list[str] | None, target_yield: float | None, studies: di
     requested = {name: value for name, value in studies.items() if value is not None}
     flags = [f"--{name.replace('_', '-')}" for name in (*(["sweep"] if sweeps else []), *requested)]
     if len(flags) > 1:
-        raise InputError([f"{' and '.join(flags)}: are studies of their own; choose one"])
+        raise InputError(f"{' and '.join(flags)}: are studies of their own; choose one")
     if target_yield is not None and studies["race_limits"] is None:
-        raise InputError([f"--yield {target_yield:g}: is a share of --race-limits; add that or leave it out"])
+        raise InputError(f"--yield {target_yield:g}: is a share of --race-limits; add that or leave it out")
     return requested
 
 
@@ -112,6 +112,6 @@ def _seeded(scene: BallScene, seed: int) -> BallScene:
     """The scene with other draws of its form errors. Raises InputError where there are none."""
     if scene.errors is None:
         raise InputError(
-            [f"--seed {seed}: no random numbers are used here; it is for the table errors and --race-limits"]
+            f"--seed {seed}: no random numbers are used here; it is for the table errors and --race-limits"
         )
     return scene.changed({"errors.seed": seed})

@@ -149,7 +149,7 @@ def optimum_study(scene: BallScene, swept: str, values: Sequence[float]) -> tupl
     try:
         scan = run(_single(scene, swept), [si * value for value in values])
     except MethodError as error:
-        raise InputError([f"--{swept}: {error}"]) from None
+        raise InputError(f"--{swept}: {error}") from None
     table = _table(scene, f"{swept}_{unit}", values, scan)
     names = {"value": f"{swept}_{unit}", **SWEPT_FIGURES, "status": "status"}
     points = [{name: point[column] for name, column in names.items() if column in point} for point in table.points()]
@@ -190,9 +190,9 @@ def race_limits(scene: BallScene, tolerance_class: str, target_yield: float, see
     row = _single(scene, "race-limits")
     if tolerance_class not in get_args(ToleranceClass):
         classes = ", ".join(get_args(ToleranceClass))
-        raise InputError([f"--race-limits {tolerance_class}: is not a tolerance class; choose one of {classes}"])
+        raise InputError(f"--race-limits {tolerance_class}: is not a tolerance class; choose one of {classes}")
     if row.bearing.bore_mm is None:
-        raise InputError(["bearing.bore_mm: missing; tolerance classes go by the bore, add it"])
+        raise InputError("bearing.bore_mm: missing; tolerance classes go by the bore, add it")
     try:
         allowed = running_accuracy(cast(ToleranceClass, tolerance_class), 1e-3 * row.bearing.bore_mm)
         if allowed.axial is None:
@@ -204,7 +204,7 @@ def race_limits(scene: BallScene, tolerance_class: str, target_yield: float, see
         }
         limits = design(bench_of(row), Lot(), **targets, seed=seed, solved=SOLVED)
     except MethodError as error:
-        raise InputError([f"--race-limits {tolerance_class}: {error}"]) from None
+        raise InputError(f"--race-limits {tolerance_class}: {error}") from None
     lengths = ("inner_roundness", "outer_roundness", "inner_sway", "outer_sway", "radial_limit", "axial_limit")
     return {
         "class": tolerance_class,
@@ -224,12 +224,12 @@ def _single(scene: BallScene, option: str) -> SingleRowScene:
     if scene.thermal is not None:
         other = f"; --sweep {SWEPT_KEYS[option]} follows them" if option in SWEPT_KEYS else ""
         raise InputError(
-            [f"--{option}: is a study at stated temperatures; state them in [mounting], not [thermal]{other}"]
+            f"--{option}: is a study at stated temperatures; state them in [mounting], not [thermal]{other}"
         )
     try:
         return single_row(scene)
     except InputError:
-        raise InputError([f"--{option}: is a study of one row of balls; a double-decker has two"]) from None
+        raise InputError(f"--{option}: is a study of one row of balls; a double-decker has two") from None
 
 
 def run(

@@ -40,7 +40,7 @@ def new(
         if is_rexs(words):
             text = rexs_text(read_rexs(Path(words), bearing), typed)
         elif bearing is not None:
-            raise InputError([f"--bearing {one_line(bearing, LONGEST_NAME)}: chooses one of a REXS file; leave it out"])
+            raise InputError(f"--bearing {one_line(bearing, LONGEST_NAME)}: chooses one of a REXS file; leave it out")
         else:
             text = scene_text(words, Options(typed))
         runs = "rbdyn simulate" if 'kind = "cylindrical_roller"' in text else "rbdyn ball"

@@ -141,20 +141,18 @@ def stiffness_map(
 
 def _check(scene: Scene | BallScene, speeds: Sequence[float], loads: Sequence[float], loss_factor: float) -> None:
     if isinstance(scene, Scene) and scene.operation.schedule is not None:
-        raise InputError(["operation.schedule: a map sets speed and load itself; take the schedule away"])
+        raise InputError("operation.schedule: a map sets speed and load itself; take the schedule away")
     if len(speeds) < FEWEST_SPEEDS:
         raise InputError(
-            [
-                f"--speed: has {counted(len(speeds), 'value')}; a table for a rotor needs {FEWEST_SPEEDS}, such as 2000:12000:6"
-            ]
+            f"--speed: has {counted(len(speeds), 'value')}; a table for a rotor needs {FEWEST_SPEEDS}, such as 2000:12000:6"
         )
     if (count := len(speeds) * len(loads)) > MOST_VALUES:
-        raise InputError([f"--speed, --load: {count} points are more than the {MOST_VALUES} kept at once; take fewer"])
+        raise InputError(f"--speed, --load: {count} points are more than the {MOST_VALUES} kept at once; take fewer")
     if not 0.0 <= loss_factor < 1.0:
-        raise InputError([f"--loss-factor {loss_factor:g}: must be at least 0 and below 1"])
+        raise InputError(f"--loss-factor {loss_factor:g}: must be at least 0 and below 1")
     if loss_factor > 0.0 and 0.0 in speeds:
         raise InputError(
-            [f"--loss-factor {loss_factor:g}: gives no damping at rest; begin --speed above 0, or leave it out"]
+            f"--loss-factor {loss_factor:g}: gives no damping at rest; begin --speed above 0, or leave it out"
         )
 
 

@@ -93,7 +93,7 @@ def _or_fault(name: str, attempt: Callable[[], Value]) -> Value:
     try:
         return attempt()
     except MethodError as error:
-        raise InputError([f"{name}: {error}"]) from None
+        raise InputError(f"{name}: {error}") from None
 
 
 def _mounting(subject: Subject, options: Options) -> dict[str, Any]:
@@ -151,9 +151,9 @@ def _envelope(named: Designation, options: Options) -> Envelope:
         return envelope(named)
     if bore is None or outside is None or width is None:
         missing = ", ".join(name for name in SIZES if options[name] is None)
-        raise InputError([f"{missing}: missing; give all of {', '.join(SIZES)} in mm, or none for a listed bearing"])
+        raise InputError(f"{missing}: missing; give all of {', '.join(SIZES)} in mm, or none for a listed bearing")
     if bore >= outside:
-        raise InputError([f"--bore {bore:g}: not below --outside {outside:g}; fix them"])
+        raise InputError(f"--bore {bore:g}: not below --outside {outside:g}; fix them")
     return Envelope(bore, outside, width)
 
 

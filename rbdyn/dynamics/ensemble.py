@@ -71,7 +71,7 @@ def threads_of(workers: int | None) -> int:
         return os.cpu_count() or 1
     if isinstance(workers, bool) or not isinstance(workers, Integral) or workers < 1:
         value = one_line(repr(workers), LONGEST_NAME)
-        raise InputError([f"workers = {value}: must be a whole number from 1; leave it out for all processors"])
+        raise InputError(f"workers = {value}: must be a whole number from 1; leave it out for all processors")
     return int(workers)
 
 

@@ -297,12 +297,10 @@ def _scenes(
 ) -> tuple[list[Scene], list[At]]:
     """The scene of each point, and its keys besides speed and load, columns rising in each row. Raises InputError."""
     if scene.operation.schedule is not None:
-        raise InputError(["operation.schedule: a map sets speed and load itself; take the schedule away"])
+        raise InputError("operation.schedule: a map sets speed and load itself; take the schedule away")
     refuse(first_guess_faults(scene.thermal, scene.lubricant, keys))
     if (count := len(columns) * len(rows)) > MOST_VALUES:
-        raise InputError(
-            [f"{', '.join(keys)}: {count} points are more than the {MOST_VALUES} kept at once; take fewer"]
-        )
+        raise InputError(f"{', '.join(keys)}: {count} points are more than the {MOST_VALUES} kept at once; take fewer")
     places = [dict(zip(keys, place, strict=True)) for place in itertools.product(columns, rows)]
     places.sort(key=lambda place: place[keys[1]])
     scenes = [scene.overridden([f"{key}={value:.17g}" for key, value in place.items()]) for place in places]

@@ -62,17 +62,17 @@ def target_of(text: str) -> float:
     try:
         return valid_target(float(number) * percent, text)
     except ValueError:
-        raise InputError([f"--target {text}: not a number; write it as 2% or 0.02"]) from None
+        raise InputError(f"--target {text}: not a number; write it as 2% or 0.02") from None
 
 
 def valid_target(target: float, text: str | None = None) -> float:
     """The target. Raises InputError unless it is a fraction above 0 and at most a half; ``text``: as it was written."""
     if isinstance(target, bool) or not isinstance(target, int | float):
-        raise InputError([f"target = {one_line(repr(target), LONGEST_NAME)}: must be a number such as 0.02"])
+        raise InputError(f"target = {one_line(repr(target), LONGEST_NAME)}: must be a number such as 0.02")
     if not 0.0 < target <= LARGEST_TARGET:
         limit = f"{100.0 * LARGEST_TARGET:g} %"
         raise InputError(
-            [f"--target {text or f'{target:g}'}: must be above 0 and at most {limit}; write it as 2% or 0.02"]
+            f"--target {text or f'{target:g}'}: must be above 0 and at most {limit}; write it as 2% or 0.02"
         )
     return target
 

@@ -123,15 +123,13 @@ def read_rexs(path: Path, bearing: str | None = None) -> RexsBearing:
         for component in found
     )
     if not found:
-        raise InputError([f"{path}: has no rolling bearing; export the bearings of the gear unit too"])
+        raise InputError(f"{path}: has no rolling bearing; export the bearings of the gear unit too")
     if bearing is not None:
         chosen = [component for component in found if bearing in (component.number, component.name)]
         if not chosen:
-            raise InputError(
-                [f"--bearing {one_line(bearing, LONGEST_NAME)}: is none of {path}; choose one of {listed}"]
-            )
+            raise InputError(f"--bearing {one_line(bearing, LONGEST_NAME)}: is none of {path}; choose one of {listed}")
     elif len(found) > 1:
-        raise InputError([f"{path}: has {len(found)} bearings; choose one by --bearing: {listed}"])
+        raise InputError(f"{path}: has {len(found)} bearings; choose one by --bearing: {listed}")
     else:
         chosen = found
     parts = [components[number] for number in inside.get(chosen[0].number, ()) if number in components]
@@ -154,10 +152,10 @@ def _components(path: Path) -> tuple[dict[str, Component], dict[str, list[str]]]
             raise ValueError("too large, or with entities")
         root = Tree.fromstring(data)
     except (Tree.ParseError, ValueError):
-        raise InputError([f"{path}: no REXS file, or one with entities; export it again as XML"]) from None
+        raise InputError(f"{path}: no REXS file, or one with entities; export it again as XML") from None
     if root.tag.rpartition("}")[2] != "model":
         raise InputError(
-            [f"{path}: no REXS file, since it begins with <{one_line(root.tag, LONGEST_NAME)}>; name another one"]
+            f"{path}: no REXS file, since it begins with <{one_line(root.tag, LONGEST_NAME)}>; name another one"
         )
     components = {}
     for element in root.iter():
@@ -203,7 +201,7 @@ def _read(path: Path, bearing: Component, parts: Sequence[Component]) -> RexsBea
     rollers = any(name in kind for name in ROLLERS) and not any(other in kind for other in OTHERS)
     if kind.startswith("axial") or not (rollers or any(name in kind for name in BALLS)):
         words = kind.replace("_", " ") or "bearing of unknown type"
-        raise InputError([f"{path}: {title} is a {words}; rbdyn reads cylindrical roller and ball bearings"])
+        raise InputError(f"{path}: {title} is a {words}; rbdyn reads cylindrical roller and ball bearings")
     by_kind = {part.kind: part for part in reversed(parts)}
     options = _Options()
     words = "own" if _interior(options, by_kind, rollers) else bearing.text(*NAMES) or bearing.name

@@ -138,10 +138,8 @@ def _solutions(start: Any, rows: int) -> tuple[Solution, ...]:
     are_solutions = isinstance(starts, tuple) and all(isinstance(row, Solution) for row in starts)
     if not are_solutions or len(starts) not in (0, rows):
         raise InputError(
-            [
-                f"start = {one_line(repr(start), LONGEST_NAME)}: must be a result of equilibrium of such a bearing, or the "
-                f"solution of each of its {counted(rows, 'row')}"
-            ]
+            f"start = {one_line(repr(start), LONGEST_NAME)}: must be a result of equilibrium of such a bearing, or the "
+            f"solution of each of its {counted(rows, 'row')}"
         )
     return starts
 

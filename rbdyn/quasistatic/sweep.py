@@ -390,9 +390,9 @@ def keys_of_texts(texts: Sequence[str]) -> dict[str, list[float]]:
         key, sign, values = text.partition("=")
         key = key.strip()
         if not sign or not key:
-            raise InputError([f"--sweep {text}: write it as key=start:stop:count or key=a,b,c"])
+            raise InputError(f"--sweep {text}: write it as key=start:stop:count or key=a,b,c")
         if key in keys:
-            raise InputError([f"--sweep {text}: {key} is swept twice; give all its values at once"])
+            raise InputError(f"--sweep {text}: {key} is swept twice; give all its values at once")
         keys[key] = number_list(values, f"--sweep {text}", FIX, 2, MOST_POINTS)
     return keys
 
@@ -400,7 +400,7 @@ def keys_of_texts(texts: Sequence[str]) -> dict[str, list[float]]:
 def axes_of(scene: BallScene, keys: Mapping[str, Sequence[float]]) -> tuple[Axis, ...]:
     """The axes of a sweep, the first key outermost. Raises InputError for keys and values that cannot be swept."""
     if not keys:
-        raise InputError(["sweep: no key to sweep; name one, such as operation.inner_speed_rpm"])
+        raise InputError("sweep: no key to sweep; name one, such as operation.inner_speed_rpm")
     data = tables(scene)
     faults = first_guess_faults(scene.thermal, scene.lubricant, keys)
     axes = []
@@ -414,22 +414,22 @@ def axes_of(scene: BallScene, keys: Mapping[str, Sequence[float]]) -> tuple[Axis
     refuse(faults)
     count = math.prod(len(axis.values) for axis in axes)
     if count > MOST_POINTS:
-        raise InputError([f"sweep: {count} points are more than {MOST_POINTS}; take fewer values"])
+        raise InputError(f"sweep: {count} points are more than {MOST_POINTS}; take fewer values")
     return tuple(axes)
 
 
 def _axis(data: dict[str, Any], key: str, values: Sequence[float]) -> Axis:
     steps = np.diff(values)
     if len(values) == 0 or not np.all(np.isfinite(values)):
-        raise InputError([f"{key}: the values {_listing(values)} are not all finite; write plain numbers"])
+        raise InputError(f"{key}: the values {_listing(values)} are not all finite; write plain numbers")
     if not (np.all(steps > 0.0) or np.all(steps < 0.0)):
-        raise InputError([f"{key}: the values {_listing(values)} must rise or fall from each to the next; sort them"])
+        raise InputError(f"{key}: the values {_listing(values)} must rise or fall from each to the next; sort them")
     path = _path(key)
     now = _now(data, path, key)
     if isinstance(now, int):
         uneven = [value for value in values if not value.is_integer()]
         if uneven:
-            raise InputError([f"{key} = {uneven[0]:g}: must be a whole number; write whole values"])
+            raise InputError(f"{key} = {uneven[0]:g}: must be a whole number; write whole values")
         values = [int(value) for value in values]
     return Axis(key, path, tuple(values))
 
@@ -439,7 +439,7 @@ def _path(key: str) -> KeyPath:
     for part in key.split("."):
         match = re.fullmatch(r"(\w+)((?:\[[1-9]\d*\])*)", part)
         if match is None:
-            raise InputError([f"{key}: not a key; write it as operation.inner_speed_rpm or operation.load_N[3]"])
+            raise InputError(f"{key}: not a key; write it as operation.inner_speed_rpm or operation.load_N[3]")
         path.append(match[1])
         path += [int(index) - 1 for index in re.findall(r"\d+", match[2])]
     return tuple(path)
@@ -451,22 +451,22 @@ def _now(data: Any, path: KeyPath, key: str) -> Any:
     for step in path:
         if isinstance(step, int):
             if not isinstance(data, list):
-                raise InputError([f"{key}: the scene has no list {place}; write it into the scene first"])
+                raise InputError(f"{key}: the scene has no list {place}; write it into the scene first")
             if step >= len(data):
-                raise InputError([f"{key}: {place} has {len(data)} items; take one of them"])
+                raise InputError(f"{key}: {place} has {len(data)} items; take one of them")
             place += f"[{step + 1}]"
         elif isinstance(data, dict) or data is None:
             place += f".{step}" if place else step
         else:
             fix = "write it out as a table of numbers first" if isinstance(data, str) else "check the key"
-            raise InputError([f"{key}: {place} = {data!r} is not a table; {fix}"])
+            raise InputError(f"{key}: {place} = {data!r} is not a table; {fix}")
         data = data[step] if isinstance(step, int) else (data or {}).get(step)
     if isinstance(data, dict):
-        raise InputError([f"{key}: is a table, not a number; name one of its keys: {', '.join(sorted(data))}"])
+        raise InputError(f"{key}: is a table, not a number; name one of its keys: {', '.join(sorted(data))}")
     if isinstance(data, list):
-        raise InputError([f"{key}: is a list, not a number; name one item, such as {key}[1]"])
+        raise InputError(f"{key}: is a list, not a number; name one item, such as {key}[1]")
     if isinstance(data, str | bool):
-        raise InputError([f"{key} = {data!r}: is not a number and cannot be swept; compare scenes with --set"])
+        raise InputError(f"{key} = {data!r}: is not a number and cannot be swept; compare scenes with --set")
     return data
 
 

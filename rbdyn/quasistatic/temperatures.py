@@ -233,7 +233,7 @@ def heat_at(scene: SingleRowScene, nodes: Array, seats: tuple[float, float] | No
         status = overload(solution, rating) or status
     if status != solution.status or not solution.is_equilibrium:
         places = ", ".join(f"{node} {value:.4g}" for node, value in zip(NODES, nodes, strict=True))
-        raise InputError([f"the bearing at {places} C: {status}"])
+        raise InputError(f"the bearing at {places} C: {status}")
     loads = loads_of(hot, model, solution)
     moments = friction_of(hot, model, loads)
     boundaries = Boundaries(inlet_temperature(thermal, scene.lubricant), thermal.ambient_C)

@@ -572,10 +572,8 @@ def scene_of(source: Scene | BallScene | Path | str, overrides: Iterable[str] = 
     if isinstance(source, str | PathLike):
         return Scene.load(Path(source), overrides)
     raise InputError(
-        [
-            f"scene = {one_line(repr(source), LONGEST_NAME)}: must be a Scene or the path of a scene file; Scene.from_dict takes "
-            "tables"
-        ]
+        f"scene = {one_line(repr(source), LONGEST_NAME)}: must be a Scene or the path of a scene file; Scene.from_dict takes "
+        "tables"
     )
 
 
@@ -584,7 +582,7 @@ def rollers_only(source: Scene | BallScene | Path | str, overrides: Iterable[str
     scene = scene_of(source, overrides)
     if isinstance(scene, Scene):
         return scene
-    raise InputError([f"bearing.kind = {scene.bearing.kind!r}: is not simulated in time; use rbdyn ball"])
+    raise InputError(f"bearing.kind = {scene.bearing.kind!r}: is not simulated in time; use rbdyn ball")
 
 
 def balls_only(source: Scene | BallScene | Path | str, overrides: Iterable[str] = ()) -> BallScene:
@@ -592,4 +590,4 @@ def balls_only(source: Scene | BallScene | Path | str, overrides: Iterable[str] 
     scene = scene_of(source, overrides)
     if isinstance(scene, BallScene):
         return scene
-    raise InputError([f"bearing.kind = {scene.bearing.kind!r}: has no balls; use rbdyn simulate"])
+    raise InputError(f"bearing.kind = {scene.bearing.kind!r}: has no balls; use rbdyn simulate")

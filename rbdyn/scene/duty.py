@@ -110,7 +110,7 @@ def read_duty(path: Path) -> list[DutyPoint]:
         return _points_of_table(read_sheet(path))
     tables = read_toml(path)
     if not tables.get("duty"):
-        raise InputError([f"{path}: duty: missing; add a [[duty]] table for each point of operation"])
+        raise InputError(f"{path}: duty: missing; add a [[duty]] table for each point of operation")
     return validated(DutyTables, {key: tables[key] for key in DutyTables.model_fields if key in tables}, str(path)).duty
 
 
@@ -214,7 +214,7 @@ def starting(scene: Scene, parts: Sequence[float] | None = None, point: Mapping[
     of keys. Raises InputError for a scene without [thermal].
     """
     if scene.thermal is None:
-        raise InputError([f"duty.{ORIGIN}: a start needs a heat balance; add [thermal] to the scene or leave it out"])
+        raise InputError(f"duty.{ORIGIN}: a start needs a heat balance; add [thermal] to the scene or leave it out")
     stated = {} if scene.thermal.start is None else scene.thermal.start.model_dump(mode="json", exclude_none=True)
     kept = {key: value for key, value in stated.items() if key not in ORIGINS}
     origin = {"from_parts_C": parts and list(parts), "from_point": point and dict(point)}

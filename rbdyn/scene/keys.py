@@ -73,7 +73,7 @@ def run(kinds: Mapping[str, type[BaseModel]], word: str | None, as_schema: bool,
         return
     matches = matching(keys(kinds), word)
     if not matches:
-        raise InputError([f"WORD = {word!r}: no key contains it; try a shorter word, or none for all keys"])
+        raise InputError(f"WORD = {word!r}: no key contains it; try a shorter word, or none for all keys")
     if as_json:
         print_json({"keys": [key._asdict() for key in matches]})
         return

@@ -35,10 +35,8 @@ class Validation(ModelMetaclass):
         """The scene of these tables. Raises InputError with all faults at once."""
         if arguments:
             raise InputError(
-                [
-                    f"{self.__name__}({one_line(repr(arguments[0]), LONGEST_NAME)}): takes tables by keyword; "
-                    f"{self.__name__}.load reads a file, {self.__name__}.from_dict a dict"
-                ]
+                f"{self.__name__}({one_line(repr(arguments[0]), LONGEST_NAME)}): takes tables by keyword; "
+                f"{self.__name__}.load reads a file, {self.__name__}.from_dict a dict"
             )
         return cast(type[SceneFile], self).from_dict(tables, self.__name__)
 
@@ -49,7 +47,7 @@ def _copied(value: T, source: str) -> T:
         return deepcopy(value)
     except (TypeError, RecursionError) as error:
         raise InputError(
-            [f"{source}: holds a value that cannot be copied ({error}); give numbers, texts, lists and tables"]
+            f"{source}: holds a value that cannot be copied ({error}); give numbers, texts, lists and tables"
         ) from None
 
 
@@ -66,7 +64,7 @@ class SceneFile(Consistent, Sparse, metaclass=Validation):
         """Validate nested tables in the form of TOML; messages name the ``source``. Raises InputError."""
         if not isinstance(data, Mapping):
             name = one_line(repr(data), LONGEST_NAME)
-            raise InputError([f"{source} = {name}: must be a dict of tables; {cls.__name__}.load reads a file"])
+            raise InputError(f"{source} = {name}: must be a dict of tables; {cls.__name__}.load reads a file")
         assignments = _assignments(overrides)
         data = _copied(data, source)
         for assignment in assignments:
@@ -82,7 +80,7 @@ class SceneFile(Consistent, Sparse, metaclass=Validation):
         """
         if not isinstance(changes, Mapping) or not all(isinstance(key, str) for key in changes):
             raise InputError(
-                [f'changes = {one_line(repr(changes), LONGEST_NAME)}: must be a dict such as {{"cage.mass_g": 50.0}}']
+                f'changes = {one_line(repr(changes), LONGEST_NAME)}: must be a dict such as {{"cage.mass_g": 50.0}}'
             )
         data = deepcopy(self._tables)
         for key, value in changes.items():
@@ -139,7 +137,7 @@ def _assignments(overrides: Any) -> list[str]:
         if all(isinstance(assignment, str) for assignment in assignments):
             return assignments
     name = one_line(repr(overrides), LONGEST_NAME)
-    raise InputError([f'overrides = {name}: must be a list such as ["cage.mass_g=50"]'])
+    raise InputError(f'overrides = {name}: must be a list such as ["cage.mass_g=50"]')
 
 
 def _leaves(table: Any, prefix: str = "") -> Iterator[str]:

@@ -247,7 +247,7 @@ def _number(scene: Scene | None, base: str, key: str, source: str) -> float:
     value = value_of(scene, base)
     if not is_number(value):
         raise InputError(
-            [f'{source}: uncertain."{key}".times = "{base}": the scene has no number there; name another key']
+            f'{source}: uncertain."{key}".times = "{base}": the scene has no number there; name another key'
         )
     return float(value)
 
@@ -258,7 +258,7 @@ def put(tables: dict[str, Any], key: str, value: Any) -> None:
     for part in path:
         tables = tables.setdefault(part, {})
         if not isinstance(tables, dict):
-            raise InputError([f'uncertain."{key}": {part} is a value, not a table; check the key'])
+            raise InputError(f'uncertain."{key}": {part} is a value, not a table; check the key')
     tables[name] = value
 
 

@@ -192,7 +192,7 @@ def read_sheet(path: Path) -> InputTable:
         return _table(path, rows, None, "", table.note, numbers)
     data = read_bytes(file)
     if file.suffix.lower() == ".ods" or data.startswith((ARCHIVE, OLD)):
-        raise InputError([f"{path}: is not a text table; save it as .xlsx or as CSV, with that ending of its name"])
+        raise InputError(f"{path}: is not a text table; save it as .xlsx or as CSV, with that ending of its name")
     text, encoding = _decoded(path, data)
     separator, rows = _fields(path, text)
     words = "" if separator == "," else SEPARATORS.get(separator, "")
@@ -210,7 +210,7 @@ def _table(
     """The table of rows of fields, the first of which is its header; ``separator`` and ``origin`` in words."""
     header, body = rows[0] if rows else [], rows[1:]
     if not header:
-        raise InputError([f"{path}: is empty; write a header of names and a row for each run"])
+        raise InputError(f"{path}: is empty; write a header of names and a row for each run")
     marks = marks_of((field.strip() for row in body for field in row), default)
     _refuse_words(path, header, body)
     # Commas between fields are usual with decimal points; other files say which mark their numbers have.
@@ -220,7 +220,7 @@ def _table(
     words = [*([f"with {together}"] if signs else []), *([origin] if origin else [])]
     names = [plain_cell(name.strip()) for name in header]
     if len(names) == 1 and "|" in names[0]:
-        raise InputError([f"{path}: has '|' between its fields; write commas there and points in numbers"])
+        raise InputError(f"{path}: has '|' between its fields; write commas there and points in numbers")
     repeated = {name: count for name, count in Counter(names).items() if count > 1 and name}
     faults = [f"{path}: column {quoted(name)} comes {count} times; keep one" for name, count in repeated.items()]
     if not body:
@@ -237,11 +237,9 @@ def _parquet(path: Path) -> "pd.DataFrame":
     try:
         return pd.read_parquet(io.BytesIO(data))
     except ImportError:
-        raise InputError(
-            [f"{path}: pandas reads parquet with pyarrow; pip install pyarrow, or save it as CSV"]
-        ) from None
+        raise InputError(f"{path}: pandas reads parquet with pyarrow; pip install pyarrow, or save it as CSV") from None
     except Exception as error:
-        raise InputError([f"{path}: no parquet file ({one_line(str(error), LONGEST_NAME)}); save it again"]) from None
+        raise InputError(f"{path}: no parquet file ({one_line(str(error), LONGEST_NAME)}); save it again") from None
 
 
 def _frame_rows(frame: "pd.DataFrame") -> list[list[str]]:
@@ -264,9 +262,9 @@ def _decoded(path: Path, data: bytes) -> tuple[str, str]:
         try:
             return data.decode("utf-16"), "in UTF-16"
         except UnicodeDecodeError:
-            raise InputError([f"{path}: cannot be read as UTF-16; save the file as UTF-8"]) from None
+            raise InputError(f"{path}: cannot be read as UTF-16; save the file as UTF-8") from None
     if data[:1000].count(0) > len(data[:1000]) // 4:
-        raise InputError([f"{path}: is not text in UTF-8; save the file as UTF-8"])
+        raise InputError(f"{path}: is not text in UTF-8; save the file as UTF-8")
     try:
         return data.decode("utf-8-sig"), ""
     except UnicodeDecodeError as error:
@@ -333,21 +331,21 @@ def _parsed(path: Path, text: str, separator: str) -> list[list[str]]:
             fields += len(row)
             if fields > MOST_FIELDS or len(rows) >= MOST_LINES:
                 most = f"{MOST_LINES} rows or {MOST_FIELDS} fields"
-                raise InputError([f"{path}: has more than {most}; check that it is the right file"])
+                raise InputError(f"{path}: has more than {most}; check that it is the right file")
             # A quoted empty field is a cell; a blank line, also one of separators, is none.
             if (len(row) == 1 and row[0] == "") or any(field.strip() for field in row):
                 rows.append(row)
             start = lines.line_num + 1
     except csv.Error as error:
         fix = "close the quotes that open there" if "unexpected end" in str(error) else "fix that line"
-        raise InputError([f"{path}: line {start}: is not CSV ({error}); {fix}"]) from None
+        raise InputError(f"{path}: line {start}: is not CSV ({error}); {fix}") from None
     return rows
 
 
 def _tidy(path: Path, rows: list[list[str]]) -> list[list[str]]:
     """Rows of equal length, without empty columns at the end. Raises InputError for rows of another length."""
     if not rows:
-        raise InputError([f"{path}: is empty; write a header of names and a row for each run"])
+        raise InputError(f"{path}: is empty; write a header of names and a row for each run")
     lengths = [_filled_length(row) for row in rows]
     width = len(rows[0]) if any(lengths[0] < length <= len(rows[0]) for length in lengths) else max(lengths[0], 1)
     rows = [row[: max(width, length)] for row, length in zip(rows, lengths, strict=True)]
@@ -382,10 +380,10 @@ def _refuse_words(path: Path, header: list[str], body: list[list[str]]) -> None:
         return
     if sum(bool(name.strip()) for name in header) < len(words):
         raise InputError(
-            [f"{path}: names columns such as {words[0]!r} below another row; remove the rows above the names"]
+            f"{path}: names columns such as {words[0]!r} below another row; remove the rows above the names"
         )
     raise InputError(
-        [f"{path}: row 1 has words where the others have numbers, such as {words[0]!r}; remove that row of units"]
+        f"{path}: row 1 has words where the others have numbers, such as {words[0]!r}; remove that row of units"
     )
 
 

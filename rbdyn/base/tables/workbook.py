@@ -52,11 +52,11 @@ class Parts:
 
     def damaged(self, place: str) -> InputError:
         """The fault of a workbook that is damaged at a place."""
-        return InputError([f"{self.path}: is a damaged workbook ({place}); open it in Excel and save it again"])
+        return InputError(f"{self.path}: is a damaged workbook ({place}); open it in Excel and save it again")
 
     def too_large(self, words: str) -> InputError:
         """The fault of a workbook beyond a bound."""
-        return InputError([f"{self.path}: {words}; save the table alone in a new workbook or as CSV"])
+        return InputError(f"{self.path}: {words}; save the table alone in a new workbook or as CSV")
 
     def related(self, name: str) -> dict[str, tuple[str, str]]:
         """Kind and name by identity of the parts that a part refers to; of the whole archive for an empty name."""
@@ -183,19 +183,19 @@ def read_workbook(path: Path, data: bytes, sheet: str | None) -> SheetCells:
     Raises InputError for a damaged, encrypted, old or too large workbook, a sheet that is not there, and formulas without values.
     """
     if data.startswith(OLD):
-        raise InputError([f"{path}: is an encrypted or an old workbook (.xls); save it as .xlsx without a password"])
+        raise InputError(f"{path}: is an encrypted or an old workbook (.xls); save it as .xlsx without a password")
     if not data.startswith(ARCHIVE):
-        raise InputError([f"{path}: is not an Excel workbook; give a table of text a name that ends in .csv"])
+        raise InputError(f"{path}: is not an Excel workbook; give a table of text a name that ends in .csv")
     parts = Parts(path, data)
     book = _book(parts)
     listed = ", ".join(one_line(item.name, LONGEST_NAME) for item in book.sheets[:20])
     if not book.sheets:
-        raise InputError([f"{path}: has no sheet with cells; save the table in one"])
+        raise InputError(f"{path}: has no sheet with cells; save the table in one")
     visible = [candidate for candidate in book.sheets if candidate.visible] or book.sheets
     named = (candidate for candidate in book.sheets if sheet is not None and candidate.name.lower() == sheet.lower())
     found = visible[0] if sheet is None else next(named, None)
     if found is None:
-        raise InputError([f"{path}: has no sheet {one_line(sheet or '', LONGEST_NAME)!r}; name one of {listed}"])
+        raise InputError(f"{path}: has no sheet {one_line(sheet or '', LONGEST_NAME)!r}; name one of {listed}")
     cells = _Cells(parts, book)
     parts.parse(found.part, cells.start, cells.end, cells.text)
     place = f"of sheet {one_line(found.name, LONGEST_NAME)!r}"

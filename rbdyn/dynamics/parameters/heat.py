@@ -104,7 +104,7 @@ def ring_width(scene: Scene) -> float:
         return scene.mounting.width
     listed = catalogue_entry(scene.bearing)
     if listed is None:
-        raise InputError(["mounting.width_mm: missing; the heat balance needs the width of the rings"])
+        raise InputError("mounting.width_mm: missing; the heat balance needs the width of the rings")
     return 1e-3 * listed[1].width
 
 

@@ -68,12 +68,12 @@ def race_traction(
     """
     table = scene.traction
     if table.elasticity and not contact.entrainment_speed > ROLLING:
-        raise InputError(["traction.elasticity = true: needs contacts that roll, which raceways do not; leave it out"])
+        raise InputError("traction.elasticity = true: needs contacts that roll, which raceways do not; leave it out")
     if table.model not in RHEOLOGIES and table.friction == "film":
         return _load_independent(scene)
     if not contact.entrainment_speed > ROLLING:
         key = f"traction.model = '{table.model}'" if table.model in RHEOLOGIES else "traction.friction = 'mixed'"
-        raise InputError([f"{key}: needs a film, but the raceways do not roll; choose another"])
+        raise InputError(f"{key}: needs a film, but the raceways do not roll; choose another")
     law = _surface(scene, race, contact, oil, largest_load) if table.model in RHEOLOGIES else _load_independent(scene)
     return _mixed(scene, law, contact, oil) if table.friction == "mixed" else law
 
@@ -152,10 +152,8 @@ def _surface(scene: Scene, race: str, contact: film_thickness.RollingContact, oi
     fit = traction.traction_surface(coefficient, largest_load, smallest_load, largest_slip)
     if fit.error > LARGEST_ERROR:
         raise InputError(
-            [
-                f"traction.model = '{scene.traction.model}': its table is off by {100.0 * fit.error:.2g} % of the peak up to "
-                f"{largest_load:.4g} N; raise lubricant.temperature_C or choose another model"
-            ]
+            f"traction.model = '{scene.traction.model}': its table is off by {100.0 * fit.error:.2g} % of the peak up to "
+            f"{largest_load:.4g} N; raise lubricant.temperature_C or choose another model"
         )
     return fit.surface
 

@@ -117,7 +117,7 @@ def row_of(scene: SingleRowScene) -> RowModel:
     """
     if scene.thermal is not None:
         raise InputError(
-            ["[thermal]: is for the equilibrium and for --sweep alone; state temperatures in [mounting] instead"]
+            "[thermal]: is for the equilibrium and for --sweep alone; state temperatures in [mounting] instead"
         )
     ball, inner, outer = (scene.material(part) for part in ("ball", "inner_ring", "outer_ring"))
     return row_model(scene.bearing, scene.model, ball, inner, outer, *scene.operation.speeds, row_change(scene))

@@ -420,14 +420,12 @@ def follow_ring(scene: BallScene) -> RingPath:
     """
     row = single_row(scene)
     if row.errors is None:
-        raise InputError(["errors: missing; a bearing without form errors has no runout, add the table"])
+        raise InputError("errors: missing; a bearing without form errors has no runout, add the table")
     steps, turns, balls = row.errors.steps, row.errors.turns, row.bearing.balls
     if (places := steps * turns * balls) > MOST_PLACES:
         raise InputError(
-            [
-                f"errors.steps = {steps}, errors.turns = {turns}: with {balls} balls these are {places} places, more than the "
-                f"{MOST_PLACES} that memory has room for; take fewer steps or turns"
-            ]
+            f"errors.steps = {steps}, errors.turns = {turns}: with {balls} balls these are {places} places, more than the "
+            f"{MOST_PLACES} that memory has room for; take fewer steps or turns"
         )
     bench = bench_of(row)
     path = turn.ball_path(errors_of(row.errors, balls), bench.turning, steps, turns)
@@ -453,7 +451,7 @@ def single_row(scene: BallScene) -> SingleRowScene:
     """The scene, if of one row. Raises InputError."""
     if not isinstance(scene, SingleRowScene):
         raise InputError(
-            ["bearing.kind = 'double_decker_ball': runout is for one row of balls only; choose such a bearing"]
+            "bearing.kind = 'double_decker_ball': runout is for one row of balls only; choose such a bearing"
         )
     return scene
 
