@@ -237,7 +237,7 @@ def compare(scene: Path, turns: float) -> None:
         times_faster,
     )
     from rbdyn.accuracy.report import processor
-    from rbdyn.base.command import print_table
+    from rbdyn.base.terminal import show
 
     stretches = starts_after_transient(Scene.load(scene), turns)
     ready = by_scipy("RK45", lambda stretch: NumpyRightHandSide(stretch.bearing))
@@ -245,7 +245,7 @@ def compare(scene: Path, turns: float) -> None:
     compiling(stretches[0], (plain,))
     known = reference(stretches)
     attempts = [found for method in (OURS, plain) for found in attempts_of(method, stretches, known)]
-    print_table(*table(attempts, turns))
+    show([table(attempts, turns)])
     ratio = times_faster(*(curve(attempts, method.name, known.floor(turns)) for method in (OURS, plain)))
     if ratio is None:
         print("the two have no range of errors in common")

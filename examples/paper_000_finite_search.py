@@ -31,10 +31,11 @@ from published import double_decker_search
 from published.double_decker_search import SearchEnd
 
 from rbdyn.accuracy.ball_solvers import Problem, problem_of, timed
-from rbdyn.base.command import print_table
+from rbdyn.base.blocks import Table
+from rbdyn.base.terminal import show
 from rbdyn.quasistatic import finite_search
 from rbdyn.quasistatic.double_decker import DoubleDeckerSolution, double_decker_of, solve_double_decker
-from rbdyn.quasistatic.finite_search import Damping, Search, offset_distances, search_points
+from rbdyn.quasistatic.finite_search import Damping, Search, search_points
 from rbdyn.quasistatic.row import equilibrium
 from rbdyn.quasistatic.row.equilibrium import Solution
 from rbdyn.quasistatic.row.model import constraint_of, load_of
@@ -152,6 +153,11 @@ def scene(condition: Condition, gyroscopic: bool | str = "unsigned") -> SingleRo
     )
     assert isinstance(made, SingleRowScene)
     return made
+
+
+def offset_distances(points: NDArray[np.float64], balls: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Distance [m] of the mean of each set of starting positions from the mean of the ``balls`` at the solution (eq 19)."""
+    return np.asarray(np.linalg.norm(points.mean(axis=1) - balls[:, :2].mean(axis=0), axis=1))
 
 
 def outcome(condition: Condition) -> Outcome:
@@ -419,7 +425,7 @@ def _show(table: pd.DataFrame) -> None:
          f"{r.their_seconds:g}", f"{r.convex_us:.0f}", f"{r.convex_steps}", f"{r.convex_residual_N:.0e}")
         for r in table.itertuples()
     ]  # fmt: skip
-    print_table("Table 3", header, rows)
+    show([Table("Table 3", header, rows)])
 
 
 def main(out: Annotated[Path | None, typer.Option(help="Write both tables and figures 7 to 11 here.")] = None) -> None:
@@ -437,7 +443,7 @@ def main(out: Annotated[Path | None, typer.Option(help="Write both tables and fi
         f"{table['nearest_search'].corr(table['their_searches']):.2f}, with ours not at all: ours converges from the second"
     )
     double = table_4_frame(table_4())
-    print_table(
+    block = Table(
         "Table 4, double-decker",
         ("Fa [N], rpm", "searches", "theirs", "nearest", "steps", "offset [um]", "left [N]", "[ms]", "their s",
          "convex [us]", "gap [%]", "inner layer [deg]", "outer"),
@@ -448,11 +454,13 @@ def main(out: Annotated[Path | None, typer.Option(help="Write both tables and fi
             for r in double.itertuples()
         ],
     )  # fmt: skip
-    print_table(
+    show([block])
+    block = Table(
         "what the paper leaves out, over Table 3",
         ("choice", "solved", "searches", "iterations in all"),
         [(name, f"{solved}", f"{few}-{most}", f"{steps}") for name, solved, few, most, steps in what_is_left_out()],
     )
+    show([block])
     typer.echo(
         f"figure 7: search and plain Newton differ by {found['method_gap']:.1e} deg (paper: 0.84 %) and plain Newton fails at "
         f"{', '.join(f'{speed:g}' for speed in found['lost']) or 'no'} rpm; inner angles rise with speed and outer ones fall, "

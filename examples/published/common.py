@@ -13,7 +13,8 @@ import numpy as np
 import pandas as pd
 
 from rbdyn import Scene, SimulationResult, simulate
-from rbdyn.base.command import print_table
+from rbdyn.base import blocks
+from rbdyn.base.terminal import show
 from rbdyn.result import Quantity
 
 EXAMPLES = Path(__file__).parent.parent
@@ -55,7 +56,7 @@ class Table:
 
     def show(self) -> None:
         """Print it."""
-        print_table(self.title, self.header, self.rows)
+        show([blocks.Table(self.title, self.header, self.rows)])
 
     def markdown(self) -> str:
         """The same for a report."""

@@ -21,7 +21,7 @@ import typer
 from typer.core import TyperCommand, TyperGroup
 from typer.main import get_command
 
-from rbdyn.base.blocks import Block, Detail, Table
+from rbdyn.base.blocks import Block, Detail
 from rbdyn.base.faults import LONGEST_NAME, InputError, MethodError, RunError, one_line, refuse
 from rbdyn.base.folder import OutputFolder, output_folder
 from rbdyn.base.identity import Identity, identity_line
@@ -269,11 +269,6 @@ class _StandardError(logging.Handler):
 
     def emit(self, record: logging.LogRecord) -> None:
         print(record.getMessage(), file=sys.stderr, flush=True)
-
-
-def print_table(title: str, header: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-    """Print one table."""
-    show([Table(title, header, rows)])
 
 
 def flag(*names: str, help: str, **more: Any) -> Any:

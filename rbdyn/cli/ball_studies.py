@@ -420,9 +420,9 @@ def _diagonal(stiffness: dict[str, Any]) -> str:
 
 def _middle_ring(report: DoubleDeckerReport) -> list[str]:
     middle = report.middle_ring
-    share = "" if middle["speed_share"] is None else f", {100.0 * middle['speed_share']:.4g} % of the speed"
+    share = "" if middle.speed_share is None else f", {100.0 * middle.speed_share:.4g} % of the speed"
     return [
-        f"middle ring: {middle['speed_rpm']:.5g} rpm{share} ({middle['speed_status']})",
+        f"middle ring: {middle.speed_rpm:.5g} rpm{share} ({middle.speed_status})",
         f"both rows: {_place(report.displacement_mm)}; stiffness {_diagonal(report.stiffness)}",
     ]
 

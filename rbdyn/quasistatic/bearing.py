@@ -20,7 +20,7 @@ from rbdyn.base.words import counted
 from rbdyn.life.balls import FASTEST
 from rbdyn.mounting.cage import OperatingClearance
 from rbdyn.quasistatic import finite_search
-from rbdyn.quasistatic.double_decker import double_decker_of, load_record, middle_record, solve_double_decker
+from rbdyn.quasistatic.double_decker import double_decker_of, load_record, middle_ring, solve_double_decker
 from rbdyn.quasistatic.result import (
     BallResult,
     DoubleDeckerReport,
@@ -174,7 +174,7 @@ def _double_decker(scene: DoubleDeckerScene, starts: tuple[Solution, ...]) -> Ba
         **displacement_record(solution.displacement),
         stiffness=stiffness_record(solution.stiffness),
         reaction=load_record(solution.reaction),
-        middle_ring=middle_record(model, solution),
+        middle_ring=middle_ring(model, solution),
         residual_N=solution.residual,
         iterations=solution.steps + sum(row.steps for row in rows),
         inner=layers["inner"],

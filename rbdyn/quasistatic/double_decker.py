@@ -29,7 +29,7 @@ from rbdyn.base.records import finite
 from rbdyn.contact.point_contact import PointContact
 from rbdyn.life import balls
 from rbdyn.mounting.rings import GrooveChange
-from rbdyn.quasistatic.result import displacement_record
+from rbdyn.quasistatic.result import MiddleRing, displacement_record
 from rbdyn.quasistatic.row.ball import CommonCage, Control, FixedShare
 from rbdyn.quasistatic.row.equilibrium import OK, Solution, solve, without_noise
 from rbdyn.quasistatic.row.model import RowModel, contacts, row_model
@@ -509,17 +509,17 @@ def static_capacity(row: BallRow, races: tuple[PointContact, PointContact]) -> f
     return balls.static_capacity(row.balls, row.contact_angle, races) if catalogue is None else catalogue
 
 
-def middle_record(model: DoubleDeckerModel, solution: DoubleDeckerSolution) -> dict[str, Any]:
-    """Record of the middle ring."""
+def middle_ring(model: DoubleDeckerModel, solution: DoubleDeckerSolution) -> MiddleRing:
+    """The middle ring as reported."""
     split = model.split
-    return {
+    return MiddleRing(
         **displacement_record(solution.middle_displacement),
-        "speed_rpm": split.speed / RPM,
-        "speed_share": finite(split.share),
-        "speed_status": split.status,
-        "friction_torque_Nmm": finite(1e3 * split.torque),
+        speed_rpm=split.speed / RPM,
+        speed_share=finite(split.share),
+        speed_status=split.status,
+        friction_torque_Nmm=finite(1e3 * split.torque),
         **load_record(solution.middle_load),
-    }
+    )
 
 
 def load_record(load: Array) -> dict[str, Any]:

@@ -135,11 +135,6 @@ def search_points(row: Row, search: Search = SEARCH) -> Array:
     return np.array([radius * (out + search.step * (k * tangent + m * out)) for k, m in steps])
 
 
-def offset_distances(points: Array, balls: Array) -> Array:
-    """Distance [m] of the mean of each set of starting positions from the mean of the ``balls`` at the solution (eq 19)."""
-    return np.asarray(np.linalg.norm(points.mean(axis=1) - balls[:, :2].mean(axis=0), axis=1))
-
-
 @entry
 def _search(
     control: Any, system: Any, damping: Any, points: Any, limit: int, strict: bool, u: Any

@@ -206,15 +206,20 @@ def tipping(displacement: Array, scene: BallScene) -> list[Remark]:
     return [Remark("tipped ring", Note("tipped-ring", sentence))] if tilt > TIPPED else []
 
 
-class RowReport(Record):
+class RingPlace(Record):
+    """Displacement of a ring by axis, units in the names."""
+
+    displacement_mm: dict[str, float]
+    tilt_mrad: dict[str, float]
+
+
+class RowReport(RingPlace):
     """Equilibrium of one row, units in the names: displacement of its inner ring, figures of each ball and of each race.
 
     ``life``: None without a load; its hours also None where nothing turns. ``searches``: starting values that the finite
     search tried. ``reaction``: load that the ring takes, of a single-row bearing only.
     """
 
-    displacement_mm: dict[str, float]
-    tilt_mrad: dict[str, float]
     balls: list[dict[str, float]]
     max_stress_MPa: dict[str, float]  # noqa: N815
     contacts: dict[str, dict[str, float]]
@@ -243,14 +248,23 @@ class RowReport(Record):
         return figures | {"loaded_balls": float(len(loaded)), "needed_friction": self.needed_friction}
 
 
-class DoubleDeckerReport(Record):
+class MiddleRing(RingPlace):
+    """Middle ring of a double-decker: its displacement, its speed and share of the rings' speed, and the load that it takes."""
+
+    speed_rpm: float
+    speed_share: float | None
+    speed_status: str
+    friction_torque_Nmm: float | None  # noqa: N815
+    load_N: dict[str, float]  # noqa: N815
+    moment_Nm: dict[str, float]  # noqa: N815
+
+
+class DoubleDeckerReport(RingPlace):
     """Equilibrium of a double-decker bearing: its inner ring, its middle ring and both rows."""
 
-    displacement_mm: dict[str, float]
-    tilt_mrad: dict[str, float]
     stiffness: dict[str, Any]
     reaction: dict[str, dict[str, float]]
-    middle_ring: dict[str, Any]
+    middle_ring: MiddleRing
     residual_N: float  # noqa: N815
     iterations: int
     inner: RowReport
@@ -348,7 +362,7 @@ class BallResult(Brief, SavedRecord, kw_only=True):
         figures |= {f"tilt_{axis}_mrad": report.tilt_mrad[axis] for axis in "xy"}
         figures |= {f"stiffness_{key}": value for key, value in report.stiffness.items() if key != "matrix_SI"}
         if isinstance(report, DoubleDeckerReport):
-            figures["middle_ring_speed_rpm"] = report.middle_ring["speed_rpm"]
+            figures["middle_ring_speed_rpm"] = report.middle_ring.speed_rpm
         figures |= {f"fit_{race}_pressure_MPa": (self.fits or {}).get(f"{race}_pressure_MPa") for race in RACES}
         nodes = {("ball" if node == "rollers" else node): value for node, value in (self.temperatures_C or {}).items()}
         figures |= {f"{node}_temperature_C": value for node, value in nodes.items()}

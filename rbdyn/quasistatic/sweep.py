@@ -360,7 +360,7 @@ def _solve(scene: BallScene, before: tuple[Solution, ...]) -> PointRecord:
     limits = (note for note in result.notes or () if note.code in ("seizure", "fast", "overspeed"))
     found += [Remark(note.code, note) for note in limits]
     if isinstance(report, DoubleDeckerReport):
-        figures["middle_ring_speed_rpm"] = report.middle_ring["speed_rpm"]
+        figures["middle_ring_speed_rpm"] = report.middle_ring.speed_rpm
     if result.temperatures_C is not None and result.thermal is not None:
         figures |= {f"{node}_temperature_C": value for node, value in result.temperatures_C.items()}
         figures |= {"thermal_gain": result.thermal["gain"], "friction_W": sum(result.thermal["friction_W"].values())}

@@ -18,7 +18,7 @@ from rbdyn.accuracy.report import Progress
 from rbdyn.base.faults import InputError
 from rbdyn.quasistatic import finite_search, full_system
 from rbdyn.quasistatic.bearing import equilibrium as solve_scene
-from rbdyn.quasistatic.finite_search import loaded, offset_distances, search_points
+from rbdyn.quasistatic.finite_search import loaded, search_points
 from rbdyn.quasistatic.full_system import evaluate, forces, system_of, unknowns
 from rbdyn.quasistatic.row import equilibrium
 from rbdyn.quasistatic.row.model import constraint_of, load_of, row_of
@@ -164,6 +164,8 @@ def test_invariant_search_points_lie_outside_both_circles_and_turn_inward(balls,
 
 
 def test_unit_offset_distance_is_that_of_the_means():
+    from paper_000_finite_search import offset_distances
+
     points = np.array([[[0.0, 0.0], [2.0, 0.0]], [[1.0, 3.0], [1.0, 5.0]]])
     assert offset_distances(points, np.array([[1.0, 0.0, 9.0, 9.0], [1.0, 0.0, 9.0, 9.0]])) == pytest.approx([0.0, 4.0])
 
