@@ -57,6 +57,7 @@ EDGES = {
     "rbdyn/accuracy/variants.py": "makes scenes of a scene",
     "rbdyn/quasistatic/result.py": "is the saved record",
     "rbdyn/quasistatic/preload.py": "makes scenes of a scene",
+    "rbdyn/quasistatic/sweep.py": "is the saved record of the points",
     "rbdyn/dynamics/simulate.py": "saves the clearance as drawn",
     "rbdyn/dynamics/duty_simulation.py": "is the saved record of the points",
     "rbdyn/dynamics/slip_map.py": "is saved by the keys that it varies",
