@@ -312,103 +312,87 @@ def _land_sliding(scene: "Scene") -> float | None:
     return 1.0 / scene.model.land_friction if guided and scene.model.land_friction > 0.0 else None
 
 
+_damage = partial(Figure, kind="damage")
+_pocket_damage = partial(_damage, needs="pockets")
+_impact_damage = partial(_pocket_damage, switch="damage.impacts")
 # Wear by Archard's law is in proportion to sliding: force times the speed of the surface on which it acts.
 CAGE_DAMAGE = (
-    Figure(
+    _damage(
         "pocket_sliding_N_m_s",
         "contact force of a pocket times the speed at which its roller slides on it, mean over time and pockets",
         timed(partial(_work, losses.POCKET_FRICTION)),
         _pocket_sliding,
-        kind="damage",
         words="force times sliding speed in a pocket [N m/s]",
         needs="pockets or model.pocket_friction",
     ),
     # Archard's depth is in proportion to it: of two designs of the same materials the ratio is that of their wear.
-    Figure(
+    _damage(
         "pocket_sliding_density_W_mm2",
         "force times sliding speed in a pocket over the area of its track; its ratio to a baseline equals the ratio of the wear depths",
         Statistic(_pocket_track, sliding_over_track),
         lambda scene: (sliding := _pocket_sliding(scene)) and 1e-6 * sliding / _pocket_length(scene),
-        kind="damage",
         words="force times sliding speed over its track [W/mm2]",
         needs="pockets or model.pocket_friction",
     ),
-    Figure(
+    _damage(
         "land_sliding_N_m_s",
         "contact force of the guide land times the speed at which the cage slides on it, mean over time",
         timed(partial(_work, losses.LAND_FRICTION)),
         _land_sliding,
-        kind="damage",
         words="force times sliding speed on the land [N m/s]",
         needs="the guide land or model.land_friction",
     ),
-    Figure(
+    _pocket_damage(
         "pocket_force_mean_N",
         "force on a pocket, mean over time and pockets; with films that on its more loaded wall",
         timed(partial(_work, losses.POCKET_FORCE)),
         _with_pockets(lambda scene: 1.0 / scene.bearing.rollers),
-        kind="damage",
         words="mean force on a pocket [N]",
-        needs="pockets",
     ),
-    Figure(
+    _pocket_damage(
         "pocket_impact_power_W",
         "power that impacts lose in all pockets: by damping of the walls and by squeezing films",
         timed(lambda run: run.work[:, losses.POCKET_DAMPING] + run.work[:, losses.POCKET_SQUEEZE]),
         _with_pockets(lambda scene: 1.0),
-        kind="damage",
         words="power that impacts lose in all pockets [W]",
-        needs="pockets",
     ),
-    Figure(
+    _impact_damage(
         "impacts_per_turn",
         "contacts of rollers and pocket walls in a shaft turn whose first approach exceeds damage.impact_speed_m_s",
         timed(lambda run: run.impacts[:, :, state.NUMBER].sum(axis=1)),
         _with_pockets(lambda scene: scene.turn_s),
-        kind="damage",
         words="impacts in all pockets in a shaft turn",
-        needs="pockets",
-        switch="damage.impacts",
     ),
-    Figure(
+    _impact_damage(
         "impact_energy_J",
         "energy that roller and free cage bring into an impact by their first approach, mean over impacts",
         Statistic(lambda run: _impacts(run)[:, [state.NUMBER, state.SQUARES]], _mean_or_none),
         _with_pockets(_half_impact_mass),
-        kind="damage",
         words="energy of an impact, mean [J]",
-        needs="pockets",
-        switch="damage.impacts",
         is_defined=_any_impacts,
     ),
-    Figure(
+    _impact_damage(
         "impact_fatigue_force_N",
         "equal peak force of all impacts that tires a bar as they do, by the exponent damage.fatigue_exponent",
         Statistic(lambda run: _impacts(run)[:, [state.NUMBER, state.PEAK_POWERS, state.EXPONENTS]], fatigue_force),
         _with_pockets(lambda scene: 1.0),
-        kind="damage",
         words="equal peak force of impacts, for fatigue [N]",
-        needs="pockets",
-        switch="damage.impacts",
         is_defined=_any_impacts,
     ),
-    Figure(
+    _pocket_damage(
         "impact_return_force_N",
         f"force on a pocket that one of {RETURN_WINDOWS} impact windows exceeds, by Gumbel's law (from {FEWEST_WINDOWS} windows on)",
         RETURN_FORCE,
         _with_pockets(lambda scene: 1.0),
-        kind="damage",
         slow=False,
         words=f"impact force that one of {RETURN_WINDOWS} windows exceeds [N]",
-        needs="pockets",
         is_defined=is_fitted,
     ),
-    Figure(
+    _damage(
         "bar_stress_MPa",
         "bending stress of a clamped cage bar under the impact return force; a fatigue limit is 0.3 to 0.4 of the strength, at least",
         RETURN_FORCE,
         _with_pockets(lambda scene: scene.bar_stress_MPa_N),
-        kind="damage",
         slow=False,
         words="stress of a bar under it, at least [MPa]",
         needs="pockets or the section of a bar (cage.bar_width_mm and three more)",
@@ -498,6 +482,7 @@ START = tuple(
     for key, figure in START_FIGURES.items()
 )
 _CONTACTS = ("max_pressure_MPa", "central_film_um", "minimum_film_um", "lambda_ratio")
+_stiffness = partial(Figure, kind="stiffness", switch="numerics.stiffness")
 PARTS = (
     *(
         Figure(
@@ -523,20 +508,16 @@ PARTS = (
     Figure("life_h", "life L10r by static loads (ISO/TS 16281)", kind="life", harmonic=True, worst="least"),
     # x is along the load, y across it.
     *(
-        Figure(
+        _stiffness(
             f"stiffness_{axes}_N_um",
             f"stiffness {way} the load by static loads (ISO/TS 16281), mean over a pitch of the rollers",
-            kind="stiffness",
-            switch="numerics.stiffness",
             worst="least",
         )
         for axes, way in (("xx", "along"), ("yy", "across"))
     ),
-    Figure(
+    _stiffness(
         "variable_compliance_um",
         "travel of the shaft's centre while the rollers pass a pitch, peak to peak, along or across the load, whichever is larger",
-        kind="stiffness",
-        switch="numerics.stiffness",
     ),
     *(
         Figure(
