@@ -128,7 +128,7 @@ class Matched:
     volumes : share of the prior that is plausible after each wave
     refuted : places of the cells that rule out every input set, else none
     sampled : the posterior; None where everything is refuted and the simulation is taken as exact
-    misfit : mean square of standardized residuals of the simulations of the posterior
+    posterior_runs, misfit : simulations of the posterior, and the mean square of standardized residuals there
     """
 
     measured: Measured
@@ -138,6 +138,7 @@ class Matched:
     volumes: list[float]
     refuted: list[int]
     sampled: Sampled | None
+    posterior_runs: Batch | None
     misfit: float
 
     def quantiles(self, points: Array) -> Array:
@@ -189,7 +190,7 @@ def matched(
         agrees = partial(_agrees, unknowns, cells, measured, wave)
         points = _spread_over(candidates[fits], agrees, count, random)
     assert batch is not None and cells is not None
-    match = Matched(measured, unknowns, batch, cells, volumes, refuted, None, 0.0)
+    match = Matched(measured, unknowns, batch, cells, volumes, refuted, None, None, 0.0)
     # A discrepancy beyond the allowed one may still show patterns; an exact simulation that is refuted identifies nothing.
     return match if refuted and not measured.scales.any() else _posterior(simulate, match, seed, particles, random)
 
@@ -201,7 +202,7 @@ def _posterior(simulate: Simulate, match: Matched, seed: int, particles: int, ra
         sample = sampled(partial(_density, match), size, seed, particles)
         rows = random.choice(particles, TRIED, replace=False)
         trial = simulate(match.quantiles(sample.points[rows]), 100 + stage)
-        match = replace(match, sampled=sample, misfit=_misfit(match.cells, trial))
+        match = replace(match, sampled=sample, posterior_runs=trial, misfit=_misfit(match.cells, trial))
         if match.misfit < MISSED:
             break
         if stage == 0:

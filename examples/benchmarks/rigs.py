@@ -215,7 +215,7 @@ def surrogate(kind: str, number: int) -> Answer:
     nothing = np.full((2, INPUTS), np.nan)
     taught = learnt("abcd", quantiles, np.full(quantiles.shape, np.nan), nothing)
     judgement = judge(found, OUTPUTS, number)
-    reasons = objections(judgement, anything=taught.anything, emulated=found.misfit < MISSED)
+    reasons = objections(judgement, has_learned=taught.has_learned, emulated=found.misfit < MISSED)
     reasons += ["refuted"] if found.refuted else []
     low, high = densest_intervals(quantiles)
     verdict = "not calibrated" if reasons else "calibrated"
