@@ -298,7 +298,7 @@ class AgendaKeeper:
         earlier_runs, repeats = stage.finished_runs, len(works) - len(new_works)
         stage_works.update(new_works)
         if len(stage_works) > stage.runs:
-            self._estimated, self._why = False, f"{stage.name} continues to {counted(len(stage_works), 'run')}: "
+            self._estimated, self._why = False, f"{stage.name}: {counted(len(stage_works), 'run')} in all; "
         stage.runs, stage.work = max(stage.runs, len(stage_works)), max(stage.work, sum(stage_works.values()))
         stage.announced_runs = len(stage_works)
 

@@ -222,7 +222,7 @@ def test_runs_beyond_the_plan_are_estimated_anew(tmp_path):
             keeper.timed(engine, works)(points, Ledger(silent_ledger, silent_ledger, silent_ledger))
     assert said == [
         "2 to 8 runs, 1 at once", "the rest takes about 30 s",
-        "input sets continues to 6 runs: the rest takes about 90 s",
+        "input sets: 6 runs in all; the rest takes about 90 s",
     ]  # fmt: skip
 
 

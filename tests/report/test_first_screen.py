@@ -308,8 +308,8 @@ def test_the_verdict_comes_first_and_every_warning_has_a_number():
     ("percents", "said"),
     [
         ((11.0, 11.0, 11.0), "All 3 responses improve. "),
-        ((11.0, 11.0, 0.1), "Impact force and whirl deviation ratio improve, of 3 responses. "),
-        ((11.0, 0.1, 0.1), "Impact force improves, of 3 responses. "),
+        ((11.0, 11.0, 0.1), "Impact force and whirl deviation ratio improve (2 of 3 responses). "),
+        ((11.0, 0.1, 0.1), "Impact force improves (1 of 3 responses). "),
         ((0.1, 0.1, 0.1), "No response improves by more than its error. "),
     ],
 )

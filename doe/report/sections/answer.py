@@ -138,13 +138,14 @@ def good_news(summary: Summary) -> str:
     real = [name for name, gain in summary.gains.items() if gain.percent > gain.error_among(count)]
     if not real:
         return "No response improves by more than its error."
-    words = " and ".join(quantity(name)[0] for name in real) if len(real) < 3 else f"{len(real)} responses"
+    named = len(real) < 3
+    words = " and ".join(quantity(name)[0] for name in real) if named else f"{len(real)} of {count} responses"
     subject = (
         f"All {count} responses improve"
         if len(real) == count > 1
         else f"{words[:1].upper()}{words[1:]} improve{'s' * (len(real) == 1)}"
     )
-    extent = "" if len(real) == count else f", of {counted(count, 'response')}"
+    extent = f" ({len(real)} of {counted(count, 'response')})" if named and len(real) < count else ""
     limits = (
         " and every limit is met" if summary.limits and not (summary.obstacles.limits or summary.obstacles.cage) else ""
     )
