@@ -11,16 +11,7 @@ from rbdyn.base.command import fill_template
 from rbdyn.base.faults import LONGEST_NAME, InputError, MethodError, one_line, refuse
 from rbdyn.draft.options import TABLE, Options, dashed
 from rbdyn.draft.values import Subject, ball_values, catalogue_subject, drawing_subject, mounting_values, roller_values
-from rbdyn.properties.catalogue import (
-    ANGULAR,
-    NO_SERIES,
-    ROLLERS,
-    Designation,
-    Envelope,
-    cage_estimate,
-    envelope,
-    read_designation,
-)
+from rbdyn.properties import catalogue
 from rbdyn.properties.drawing import BallDrawing, RollerDrawing, ball_boundary, roller_boundary
 from rbdyn.properties.rexs import SIZES as REXS_SIZES
 from rbdyn.properties.rexs import RexsBearing
@@ -69,7 +60,7 @@ def scene_text(words: str, options: Options) -> str:
     first, _, inside = words.strip().partition(" ")
     is_own = first.lower() == OWN
     subject = own_subject(inside.strip(), options) if is_own else _catalogue_bearing(words, options)
-    rollers = subject.kind == ROLLERS
+    rollers = subject.kind == catalogue.ROLLERS
     cause = f"--clearance {subject.clearance}" if is_own else f"DESIGNATION {one_line(words, LONGEST_NAME)}"
     values = _or_fault(cause, lambda: (roller_values if rollers else ball_values)(subject, options))
     template = Path(__file__).with_name("roller_scene.toml" if rollers else "ball_scene.toml")
@@ -114,16 +105,16 @@ def _catalogue_bearing(words: str, options: Options) -> Subject:
     for stated in options.typed(*OF_DRAWINGS):
         options.note(f"{stated}: is of a bearing of one's own; leave it out, or write {OWN} instead of {name}")
     try:
-        named = read_designation(words)
+        named = catalogue.read_designation(words)
     except MethodError as error:
         raise InputError([*options.faults, f"DESIGNATION {name}: {error}"]) from None
-    options.check_kind(named.kind == ROLLERS)
+    options.check_kind(named.kind == catalogue.ROLLERS)
     _note_contradictions(named, options)
     refuse(options.faults)
     return _or_fault(f"DESIGNATION {name}", lambda: catalogue_subject(named, _envelope(named, options), options))
 
 
-def _note_contradictions(named: Designation, options: Options) -> None:
+def _note_contradictions(named: catalogue.Designation, options: Options) -> None:
     """Note options that contradict a designation, and a clearance of a bearing that has a contact angle instead."""
     clearance, of_suffix, cage = options.clearance, named.value_of("clearance"), named.value_of("cage")
     if named.value_of("bore") is not None:
@@ -133,28 +124,28 @@ def _note_contradictions(named: Designation, options: Options) -> None:
         if options["--shaft"] is not None:
             options.fault("--shaft", "a tapered bore has no such seat; leave it out")
     angular = "an angular contact bearing has a contact angle instead; leave it out"
-    if named.kind == ANGULAR and clearance is not None:
+    if named.kind == catalogue.ANGULAR and clearance is not None:
         options.fault("--clearance", angular)
     elif clearance is not None and of_suffix not in (None, clearance):
         options.fault("--clearance", f"contradicts {of_suffix} of {named.name}; leave one out")
-    if named.kind == ANGULAR and of_suffix is not None:
+    if named.kind == catalogue.ANGULAR and of_suffix is not None:
         options.note(f"DESIGNATION {named.name}: suffix {of_suffix}: {angular}")
     if cage is not None:
         for stated in options.typed("--guidance", "--cage-material"):
             options.note(f"{stated}: contradicts the cage {cage} of {named.name}; leave one out")
 
 
-def _envelope(named: Designation, options: Options) -> Envelope:
+def _envelope(named: catalogue.Designation, options: Options) -> catalogue.Envelope:
     """Boundary dimensions as typed or as the catalogue lists them. Raises MethodError, InputError."""
     bore, outside, width = options.bore, options.outside, options.width
     if not options.typed(*SIZES):
-        return envelope(named)
+        return catalogue.envelope(named)
     if bore is None or outside is None or width is None:
         missing = ", ".join(name for name in SIZES if options[name] is None)
         raise InputError(f"{missing}: missing; give all of {', '.join(SIZES)} in mm, or none for a listed bearing")
     if bore >= outside:
         raise InputError(f"--bore {bore:g}: not below --outside {outside:g}; fix them")
-    return Envelope(bore, outside, width)
+    return catalogue.Envelope(bore, outside, width)
 
 
 OWN = "own"
@@ -230,7 +221,7 @@ def _most_rollers(drawing: RollerDrawing) -> int:
 def _bar(drawing: RollerDrawing) -> float:
     """Width of a cage bar [mm] as the scene will estimate it, where it is narrowest."""
     number, diameter, length, pitch = drawing
-    cage = cage_estimate(NO_SERIES, length, number, diameter, length, pitch)
+    cage = catalogue.cage_estimate(catalogue.NO_SERIES, length, number, diameter, length, pitch)
     return min(cage.bar_width, _chord(number, pitch) - diameter - cage.pocket_clearance)
 
 

@@ -24,15 +24,7 @@ from rbdyn.base.faults import InputError, RunError
 from rbdyn.base.notes import Note, Notes, status_notes
 from rbdyn.dynamics.ensemble import Reporter
 from rbdyn.dynamics.forces.equations import RollerBearing
-from rbdyn.dynamics.parameters.heat import (
-    Network,
-    flow_notes,
-    heat_model,
-    loss_levels,
-    network_of,
-    ring_width,
-    term_shares,
-)
+from rbdyn.dynamics.parameters import heat
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.part_figures import at_temperatures_with_errors
 from rbdyn.dynamics.recording import Ensemble
@@ -84,12 +76,12 @@ class Trial(NamedTuple):
 
     hot: Scene
     bearing: RollerBearing
-    network: Network
+    network: heat.Network
     ensemble: Ensemble
     clock: dict[str, float]
 
 
-def temperature_figures(state: Array, network: Network, slopes: Array) -> list[Statistic]:
+def temperature_figures(state: Array, network: heat.Network, slopes: Array) -> list[Statistic]:
     """Steady temperature of each node [C] as a statistic of the replicates of a state (4,).
 
     T + (1 - dM/dT)^-1 (M - T), with M = offset + weights times the powers. With slopes of 0 it is M, which balances the heat.
@@ -176,7 +168,7 @@ class Balance:
         hot = at_temperatures(self.scene, Temperatures(*temperatures.tolist()), seats)
         # The numerics of a short run change no parameter, and tables of traction take a quarter of a second.
         bearing = roller_bearing(hot)
-        network = network_of(hot, self.thermal, bearing)
+        network = heat.network_of(hot, self.thermal, bearing)
         ensemble, clock = self.simulate(cut(hot), bearing, progress, starts)
         self.compile_s += clock["compile_s"]
         self.wall_s += clock["wall_s"]
@@ -187,7 +179,7 @@ class Balance:
         ]
         image = np.array([figure.value for figure in figures])
         noise = np.array([figure.statistical_error or 0.0 for figure in figures])
-        model = heat_model(hot, network, temperatures, powers_of(ensemble.runs), self.viscosity)
+        model = heat.heat_model(hot, network, temperatures, powers_of(ensemble.runs), self.viscosity)
         return State(temperatures, image, noise, model, Trial(hot, bearing, network, ensemble, clock))
 
     def slight(self, state: State) -> State | None:
@@ -198,7 +190,9 @@ class Balance:
                 return None
             try:
                 hot = at_temperatures(self.scene, Temperatures(*nodes.tolist()))
-                model = model._replace(conductances=network_of(hot, self.thermal, roller_bearing(hot)).conductances)
+                model = model._replace(
+                    conductances=heat.network_of(hot, self.thermal, roller_bearing(hot)).conductances
+                )
             except InputError:
                 return None
             nodes = model.balanced()
@@ -404,14 +398,14 @@ def _result(
     if steady and scene.thermal is not None and scene.thermal.near is not None:
         figures = figures | {POWER_LOSS: _shifted(figures[POWER_LOSS], heat_to_steady(state, slopes))}
     network = trial.network
-    heat = network.terms(powers_of(trial.ensemble.runs)) @ network.term_shares
+    of_nodes = network.terms(powers_of(trial.ensemble.runs)) @ network.term_shares
     ranges = _ranges(scene, trial.hot, path, slopes) if steady else None
     record = {
         "status": status,
         **({"reason": reason} if reason else {}),
         "gain": gain(slopes),
         **({"slopes": slopes.tolist()} if steady else {}),
-        "heat_W": dict(zip(NODES, heat.tolist(), strict=True)),
+        "heat_W": dict(zip(NODES, of_nodes.tolist(), strict=True)),
         "windage_W": network.windage,
         "carried_off_W": carried_off(network.conductances, network.boundaries, state.image),
         "conductances_W_K": network.conductances._asdict(),
@@ -457,9 +451,9 @@ def _ranges(scene: Scene, hot: Scene, path: Sequence[State], slopes: Array) -> R
     return input_ranges(
         scene,
         about,
-        lambda share: term_shares(hot, share),
+        lambda share: heat.term_shares(hot, share),
         clearances,
-        loss_levels(hot, path[-1].run.bearing),
+        heat.loss_levels(hot, path[-1].run.bearing),
         estimated,
     )
 
@@ -493,4 +487,4 @@ def _notes(scene: Scene, hot: Scene, status: str, reason: str, ranges: Ranges | 
     notes = [*status_notes(f"{status}: {reason}"), *(() if ranges is None else ranges.notes)]
     thermal, mounting = scene.thermal, scene.mounting
     assert thermal is not None and mounting is not None
-    return (*notes, *heat_notes(thermal, scene.lubricant, mounting, ring_width(scene)), *flow_notes(hot))
+    return (*notes, *heat_notes(thermal, scene.lubricant, mounting, heat.ring_width(scene)), *heat.flow_notes(hot))

@@ -18,19 +18,7 @@ from rbdyn.contact.hertz_line import LineContactOnBar, dowson_higginson, houpert
 from rbdyn.contact.tangential import ElasticContact, RigidContact
 from rbdyn.contact.traction import CoulombTraction, NoTraction, dry_friction
 from rbdyn.dynamics.forces import bodies
-from rbdyn.dynamics.forces.cage import (
-    DryContact,
-    Impacts,
-    InnerGuide,
-    LippedPocket,
-    LubricatedPocket,
-    NoFilm,
-    NoGuide,
-    NoImpacts,
-    NoPocket,
-    OuterGuide,
-    Pocket,
-)
+from rbdyn.dynamics.forces import cage as cage_laws
 from rbdyn.dynamics.forces.equations import RollerBearing
 from rbdyn.dynamics.forces.race_lanes import NoOpenFilm
 from rbdyn.dynamics.forces.race_samples import NoRaceSamples, RaceSamples, RaceScale
@@ -419,28 +407,28 @@ def rolling_law(scene: Scene, oil: Oil, reduced_radius: float) -> Any:
 def _pocket(scene: Scene, oil: Oil) -> Any:
     laws, cage = scene.model, scene.cage
     if laws.pocket == "off":
-        return NoPocket()
+        return cage_laws.NoPocket()
     touching = cage.pocket_contact_length or scene.bearing.effective_length
     plain = palmgren(_modulus(scene, "roller", "cage"), touching)
     bar = laws.pocket_bar_stiffness_N_m
     contact = plain if bar == "rigid" else LineContactOnBar(plain.stiffness, float(bar))
     damping, friction = _hunt_crossley(laws.alpha("pocket")), _friction(scene, laws.pocket_friction)
     clearance, radius = 0.5 * scene.pocket_clearance_m, scene.geometry.roller_radius
-    pocket: Any = Pocket(clearance, radius, contact, damping, friction)
+    pocket: Any = cage_laws.Pocket(clearance, radius, contact, damping, friction)
     if laws.pocket_film:
         from rbdyn.contact.cage_film import pocket_film
 
         floor = laws.pocket_film_floor
         covered = cage.pocket_contact_length or scene.bearing.roller_length
         film = pocket_film(oil.viscosity, radius, covered, floor, laws.pocket_fill)
-        walls = Pocket(clearance - floor, radius, contact, damping, friction)
-        pocket = LubricatedPocket(walls, film, clearance, radius)
+        walls = cage_laws.Pocket(clearance - floor, radius, contact, damping, friction)
+        pocket = cage_laws.LubricatedPocket(walls, film, clearance, radius)
     lip, mounted = scene.lip_clearance_m, scene.cage_clearances
     if lip is None:
         return pocket
     outer, inner = scene.geometry.raceways
     circle = 0.5 * (outer + inner) + (0.0 if mounted is None else mounted.shift)
-    return LippedPocket(pocket, circle, 0.5 * lip, radius, contact, damping, friction)
+    return cage_laws.LippedPocket(pocket, circle, 0.5 * lip, radius, contact, damping, friction)
 
 
 def pocket_width(scene: Scene) -> float:
@@ -452,11 +440,11 @@ def pocket_width(scene: Scene) -> float:
     return 2.0 * float(film_thickness.half_width(contact, 1.0 / scene.bearing.rollers))
 
 
-def _impacts(scene: Scene) -> NoImpacts | Impacts:
+def _impacts(scene: Scene) -> cage_laws.NoImpacts | cage_laws.Impacts:
     damage = scene.damage
     if scene.model.pocket == "off" or not damage.impacts:
-        return NoImpacts()
-    return Impacts(damage.impact_speed_m_s, damage.fatigue_exponent)
+        return cage_laws.NoImpacts()
+    return cage_laws.Impacts(damage.impact_speed_m_s, damage.fatigue_exponent)
 
 
 # Factor of Blok's flash temperature for a parabolic distribution of heat.
@@ -486,25 +474,29 @@ def _race_samples(scene: Scene, bearing: RollerBearing) -> NoRaceSamples | RaceS
     )
 
 
-def _guide(scene: Scene, oil: Oil) -> NoGuide | OuterGuide | InnerGuide:
+def _guide(scene: Scene, oil: Oil) -> cage_laws.NoGuide | cage_laws.OuterGuide | cage_laws.InnerGuide:
     laws, cage, clearance = scene.model, scene.cage, scene.guide_clearance_m
     if clearance is None:
-        return NoGuide()
+        return cage_laws.NoGuide()
     land = scene.geometry.land_radius
     journal = land - clearance if cage.guidance == "outer" else land
-    film: Any = NoFilm()
+    film: Any = cage_laws.NoFilm()
     play = clearance
     if laws.guide_land == "film":
         floor = laws.land_film_floor
         play -= floor
         film = short_journal_film(oil.viscosity, journal, cage.land_width, cage.lands, clearance, floor, laws.land_fill)
-    dry = DryContact(
+    dry = cage_laws.DryContact(
         play,
         palmgren(_modulus(scene, "cage", "rings"), cage.lands * cage.land_width),
         _hunt_crossley(laws.alpha("land")),
         _friction(scene, laws.land_friction),
     )
-    return OuterGuide(journal, film, dry) if cage.guidance == "outer" else InnerGuide(journal, film, dry)
+    return (
+        cage_laws.OuterGuide(journal, film, dry)
+        if cage.guidance == "outer"
+        else cage_laws.InnerGuide(journal, film, dry)
+    )
 
 
 def _drag(scene: Scene, oil: Oil) -> Any:
