@@ -361,9 +361,9 @@ def _contributions(
     variances = [moments(part, part.distribution)[1] for part in parts]
     spread = [slopes[part.name] ** 2 * variance for part, variance in zip(parts, variances, strict=True)]
     reach = [abs(slopes[part.name]) * part.tolerance_mm for part in parts]
-    whole = [sum(column) or 1.0 for column in (spread, reach)]
+    totals = [sum(column) or 1.0 for column in (spread, reach)]
     for part, variance, scatter, width in zip(parts, variances, spread, reach, strict=True):
-        shares = {"variance_percent": 100 * scatter / whole[0], "worst_case_percent": 100 * width / whole[1]}
+        shares = {"variance_percent": 100 * scatter / totals[0], "worst_case_percent": 100 * width / totals[1]}
         six_sigma = 6 * abs(slopes[part.name]) * sqrt(variance)
         percent[part.name], sizes[part.name] = shares, {"worst_case_mm": width, "six_sigma_mm": six_sigma}
     return percent, sizes

@@ -251,7 +251,7 @@ def cross_validate(
     """
     points, response = np.asarray(coded, float), np.asarray(values, float)
     variances = np.zeros(len(response))
-    whole = fit_emulator(points, response, variances, trend="constant")
+    fitted = fit_emulator(points, response, variances, trend="constant")
     group = replicate_groups(points)
     basis = np.zeros((len(points), 1)) if matrix is None else np.linalg.qr(np.asarray(matrix, float))[0]
     firsts = np.unique(group)
@@ -260,7 +260,7 @@ def cross_validate(
 
     def process(rows: Rows, places: Array) -> Array:
         runs = points[rows], response[rows], variances[rows]
-        return fit_emulator(*runs, trend="constant", start=whole.hyperparameters, search=singly).mean(places)
+        return fit_emulator(*runs, trend="constant", start=fitted.hyperparameters, search=singly).mean(places)
 
     def polynomial(rows: Rows, places: Array) -> Array:
         return refit(rows).predict(places)
@@ -274,7 +274,7 @@ def cross_validate(
     scores = [_score(score, truths) for score in squares.T]
     return Comparison(
         polynomial=Score(*scores[0]),
-        gaussian_process=_process_score(*scores[1], whole),
+        gaussian_process=_process_score(*scores[1], fitted),
         difference=difference,
         points=len(truths),
         folds=len(folds),

@@ -111,9 +111,9 @@ def duty_answer(study: Problem, runs: Runs, confirmed: Mapping[str, Confirmed]) 
     for point in study.file.duty:
         name, here = point.name, study_at(study, point.name)
         ends = [_at_point(here, end, name) for end in (baseline, pick)]
-        own, note = None, ""
+        alone, note = None, ""
         try:
-            own = own_pick(here, runs.at_points[name], pick.point)
+            alone = own_pick(here, runs.at_points[name], pick.point)
         except InputError as error:
             note = f"{name} alone has no selected design: {'; '.join(error.faults)}"
         before, after = (
@@ -122,7 +122,7 @@ def duty_answer(study: Problem, runs: Runs, confirmed: Mapping[str, Confirmed]) 
         )
         at_ends = gains(here, *ends)
         points.append(
-            AtPoint(name, study.shares[name], [*point.set], before, after, at_ends, own, note, origin=point.origin)
+            AtPoint(name, study.shares[name], [*point.set], before, after, at_ends, alone, note, origin=point.origin)
         )
     aggregate: dict[str, str] = {
         response.name: response.aggregate for response in study.file.response if not isinstance(response, PointResponse)

@@ -165,11 +165,11 @@ def manufacture_of(group: ClearanceParts, step: float) -> Manufacture:
     finer = names[names.index(group.grade) :: -1]
 
     def made(grade: str, half: float) -> Manufacture:
-        whole = 0.5 * sum(abs(part.coefficient) * table[grade] for part, table in widths) + rollers * half
+        width = 0.5 * sum(abs(part.coefficient) * table[grade] for part, table in widths) + rollers * half
         sizes = " and ".join(f"{part.name} {1e3 * table[grade]:g} um" for part, table in widths)
         graded = "".join(f", {part.name} within {1e3 * half:g} um of nominal" for part in group.parts if part.graded)
         why = "" if grade == finer[0] else f"; {finer[0]} would be wider than a step"
-        return Manufacture(round(whole, DIGITS), half, f"{grade} (ISO 286-1): {sizes}{graded}{why}")
+        return Manufacture(round(width, DIGITS), half, f"{grade} (ISO 286-1): {sizes}{graded}{why}")
 
     halves = ROLLER_HALF_WIDTHS if rollers else ROLLER_HALF_WIDTHS[:1]
     candidates = [made(grade, half) for half in halves for grade in finer]

@@ -120,13 +120,13 @@ supply_of = choice("is not a known lubrication method", *SUPPLIES)
 
 
 def option(
-    metavar: str, says: str, default: str | bool, reader: Callable[[str], Any] = str, key: str = "", **more: str
+    metavar: str, help: str, default: str | bool, reader: Callable[[str], Any] = str, key: str = "", **more: str
 ) -> Any:
     """Entry of the table: metavar, help, the value without the option, what reads its text, and the key of the scene that takes it.
 
     ``remedy``: what to write where it is missing. ``preset``: its text where it is left out.
     """
-    return field(default=None, metadata={"option": valued(metavar, says, default), "reader": reader, "key": key} | more)
+    return field(default=None, metadata={"option": valued(metavar, help, default), "reader": reader, "key": key} | more)
 
 
 @dataclass

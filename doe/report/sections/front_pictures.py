@@ -134,17 +134,17 @@ class Fronts:
         """The fronts over pairs of responses, whose ``goals`` are by name, and what the marks mean."""
         names = list(enumerate(goals))
         pairs = drawn_pairs(list(goals.values()))
-        return [*(self._pair(names[one], names[two]) for one, two in pairs), self._legend()]
+        return [*(self._pair(names[x], names[y]) for x, y in pairs), self._legend()]
 
-    def _pair(self, one: tuple[int, str], two: tuple[int, str]) -> Still:
+    def _pair(self, x: tuple[int, str], y: tuple[int, str]) -> Still:
         """The fronts over two responses, given as place and name, with limits nearby and with what simulation confirmed."""
-        simulated = {name: _simulated(point, one[1], two[1]) for name, point in self.confirmed.items()}
+        simulated = {name: _simulated(point, x[1], y[1]) for name, point in self.confirmed.items()}
         axes, drawn = [], dict[str, list[float]]()
-        for along, (place, name) in enumerate((one, two)):
+        for along, (place, name) in enumerate((x, y)):
             values = [point.responses[name] for point in self.points] + [pair[0][along] for pair in simulated.values()]
             drawn[name] = near(self.limits.get(name, ()), values)
             axes.append(Coordinate("responses", name, place, span([*values, *drawn[name]])))
-        words = f"Front: {quantity(two[1])[0]} on {quantity(one[1])[0]}"
+        words = f"Front: {quantity(y[1])[0]} on {quantity(x[1])[0]}"
         still = Still(words, partial(self._draw_pair, axes, simulated, drawn))
         return replace(still, data={"front": _data("pair", axes, still)})
 
@@ -214,9 +214,9 @@ class Fronts:
         return replace(still, data={"front": _data("parallel", axes, still)})
 
 
-def _simulated(point: ConfirmedPoint, one: str, two: str) -> Simulated:
+def _simulated(point: ConfirmedPoint, first: str, second: str) -> Simulated:
     """Two responses of a confirmed point with the half-widths of their intervals."""
-    x, y = (point.responses[name] for name in (one, two))
+    x, y = (point.responses[name] for name in (first, second))
     return (x.value, y.value), (x.error, y.error)
 
 
@@ -417,19 +417,19 @@ def _progress(lines: Sequence[Curve], axis: "Axes") -> None:
     axis.legend(**BENEATH)
 
 
-def _where(spent: Runs, pick: Mapping[str, float], one: str, two: str, axis: "Axes") -> None:
+def _where(spent: Runs, pick: Mapping[str, float], first: str, second: str, axis: "Axes") -> None:
     """All runs over two factors."""
     for why, runs in spent.items():
         mark, colour = RUN_MARKS[why]
-        x, y = ([point[name] for point, _ in runs] for name in (one, two))
+        x, y = ([point[name] for point, _ in runs] for name in (first, second))
         sizes = [AREA * count for _, count in runs]
         points = axis.scatter(
             x, y, sizes, COLOURS[colour], marker=mark, edgecolors=COLOURS["paper"], linewidths=0.8, label=why
         )
         name_marks(points, why, [f"{why}, {count} replicates" for _, count in runs])
     (star,) = axis.plot(
-        pick[one],
-        pick[two],
+        pick[first],
+        pick[second],
         "*",
         color=COLOURS["vermilion"],
         markeredgecolor=COLOURS["paper"],
@@ -437,5 +437,5 @@ def _where(spent: Runs, pick: Mapping[str, float], one: str, two: str, axis: "Ax
         label="selected design",
     )
     name_marks(star, "pick", ["selected design"])
-    axis.set(xlabel=label(one), ylabel=label(two))
+    axis.set(xlabel=label(first), ylabel=label(second))
     axis.legend(ncol=3, markerscale=0.8, title="size: replicates", title_fontsize=SMALL, **BENEATH)

@@ -156,8 +156,8 @@ def _members(trees: Trees, module: str, node: Named) -> Iterator[str]:
                     listed.add(member.name)
                     read = any("property" in ast.unparse(decorator) for decorator in member.decorator_list)
                     call = member.name + ("" if read else f"({ast.unparse(member.args)})") + _gives(member)
-                    says = _text(member).replace("\n", "\n  ")
-                    yield f"- `{call}`: {says}"
+                    text = _text(member).replace("\n", "\n  ")
+                    yield f"- `{call}`: {text}"
 
 
 OPTION = re.compile(r"(?<!\S)(--?[a-z][\w-]*)")
@@ -306,7 +306,7 @@ def commands_of(part: Part) -> Iterator[str]:
         context = typer.Context(command, info_name=title)
         usage = " ".join(command.get_usage(context).removeprefix("Usage: ").split())
         records = filter(None, (parameter.get_help_record(context) for parameter in command.params))
-        options = "\n".join(f"- `{option}`: {plain(says)}" for option, says in records)
+        options = "\n".join(f"- `{option}`: {plain(text)}" for option, text in records)
         yield f"## `{title}`\n\n```sh\n{usage}\n```\n\n{plain(command.help)}\n\n{options}"
 
 
