@@ -5,6 +5,7 @@ those with one scene are one, so that neither the order of the tables nor a poin
 """
 
 import math
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -31,6 +32,8 @@ if TYPE_CHECKING:
     from rbdyn.base.estimate import Estimate
 
 
+# Largest share of a minor point over that of the main one: its noise counts by the square.
+MINOR = 0.25
 # Figures whose mean over time is that of their inverse.
 HARMONIC = {figure.key for figure in FIGURES if figure.harmonic}
 
@@ -130,6 +133,16 @@ class Duty:
     def main(self) -> str:
         """The point with the largest share of the time."""
         return max(self.shares, key=lambda name: self.shares[name])
+
+    @property
+    def minor(self) -> set[tuple[str, ...]]:
+        """Overrides of points with a small share of the time, whose noise hardly counts where all goals are means over it."""
+        if any(rule.aggregate != "mean" for rule in self.rules.values() if rule.goal != "none"):
+            return set()
+        shares = Counter[tuple[str, ...]]()
+        for name, overrides in self.overrides.items():
+            shares[tuple(overrides)] += self.shares[name]
+        return {overrides for overrides, share in shares.items() if share <= MINOR * max(shares.values())}
 
     @property
     def columns(self) -> list[str]:

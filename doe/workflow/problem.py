@@ -224,10 +224,14 @@ class Problem(Study):
         return RunPlan(design, actual, scenes, labels, [self.by_factor(point) for point in actual])
 
     def _design_run(self, point: Array, seed: int, replicates: int | None = None) -> Run:
-        """Scenes of a design run, with all their replicates unless another number is given."""
-        effort = [] if replicates is None else [f"numerics.replicates={replicates}"]
+        """Scenes of a design run, with all their replicates unless another number is given, of which minor points have half."""
+        minor = set() if self.duty is None else self.duty.minor
 
         def scene(overrides: Sequence[str]) -> Scene:
+            count = replicates
+            if count is not None and tuple(overrides) in minor:
+                count = max(count // 2, 2)
+            effort = [] if count is None else [f"numerics.replicates={count}"]
             return self._scene_in_region(point, seed, [*overrides, *effort])
 
         return self._begun(self.over_duty(scene, self.baseline_scenes))

@@ -161,6 +161,31 @@ def test_every_point_of_a_run_has_its_seed(tmp_path):
     assert {scene.numerics.replicates for scene in search.scenes.values()} == {3}
 
 
+@pytest.mark.parametrize(
+    ("idle", "aggregate", "replicates"), [(0.2, "mean", [2, 4]), (0.2, "worst_relative", [4, 4]), (0.3, "mean", [4, 4])]
+)
+def test_minor_points_have_half_of_the_replicates_of_design_runs(tmp_path, idle, aggregate, replicates):
+    """Unit: a point with at most a quarter of the main share, where all goals are means; confirmations have all everywhere."""
+    duty = IDLE_AND_CRUISE.replace("0.25", str(idle)).replace("0.75", str(1.0 - idle))
+    study = duty_study(
+        tmp_path, duty, (IMPACT, f'{IMPACT}aggregate = "{aggregate}"\n'), ("replicates=2", "replicates=8")
+    )
+    assert (study.first_replicates, study.further_replicates) == (4, 4)
+    for further in (False, True):
+        for run in study.design_scenes(study.plan.actual, study.design.order.tolist(), further=further):
+            assert [run.scenes[name].numerics.replicates for name in ("idle", "cruise")] == replicates
+    confirmed = study.confirmation_run(study.baseline).scenes.values()
+    assert {scene.numerics.replicates for scene in confirmed} == {study.file.confirmation.replicates}
+
+
+def test_equal_points_are_minor_by_their_share_together():
+    """Unit: two points of one scene count as one."""
+    rule = Rule("mean", "min", None)
+    shares = {"cruise": 0.6, "idle": 0.15, "wait": 0.15, "take-off": 0.1}
+    overrides = {"cruise": [], "idle": ["a=1"], "wait": ["a=1"], "take-off": ["a=2"]}
+    assert Duty(shares, overrides, {"power_loss_W": rule}).minor == {("a=2",)}
+
+
 def test_the_optimum_of_the_mean_lies_between_those_of_the_points(tmp_path, monkeypatch):
     """Impact is least at pocket clearance 0.26 mm when fast and at 0.34 mm when slow: by half of the time each, at 0.30 mm."""
 
