@@ -145,7 +145,7 @@ def lives(
 
     ``hot``: scenes at the temperatures of a heat balance by name of the design and point.
     """
-    from rbdyn.dynamics.duty import roller_duty_life
+    from rbdyn.dynamics.part_figures import roller_duty_life
 
     names, life = [point.name for point in study.file.duty], {}
     for name, place in ends.items():

@@ -308,7 +308,7 @@ def _clearances(result: SimulationResult) -> list[Block]:
 
 def _life_sentence(result: SimulationResult) -> str:
     """Reference life by static loads; empty where it has no end, or the bearing had no steady temperatures."""
-    from rbdyn.dynamics.duty import static_life
+    from rbdyn.dynamics.part_figures import static_life
     from rbdyn.scene.thermal import simulated_scene
 
     if result.status != "ok":
@@ -438,7 +438,7 @@ def map_duty(scene: Scene, path: Path, speeds_rpm: Sequence[float], loads_N: Seq
 
     Raises InputError with all faults at once, RunError for a point without steady temperatures.
     """
-    from rbdyn.dynamics.duty import roller_duty_life
+    from rbdyn.dynamics.part_figures import roller_duty_life
     from rbdyn.dynamics.simulate import steady_scene
 
     stated = read_duty(path)

@@ -176,7 +176,7 @@ def _named(matrix: Array) -> dict[str, float]:
 
 def _rollers(scene: Scene, workers: int | None) -> tuple[Array, float, float]:
     """Stiffness [N/m], operating clearance and travel [um] of rollers at steady temperatures."""
-    from rbdyn.dynamics.duty import row_stiffness
+    from rbdyn.dynamics.part_figures import row_stiffness
 
     if scene.thermal is not None:
         from rbdyn.dynamics.simulate import steady_scene

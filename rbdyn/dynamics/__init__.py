@@ -6,9 +6,10 @@
 - ``simulate``: their figures as one result;
   ``temperatures``: those that the friction of a bearing keeps up; ``start``: those of a cold machine over time
 - ``figures``: one list of them, which studies, maps, rigs and the manual follow; ``statistics``: their errors
-- ``part_figures``: those of parts; ``cage_verdict``: class of the cage by its orbit; ``duty_simulation``: runs over a duty
+- ``part_figures``: those of parts, and life, also over a duty, and stiffness by static loads, without a run
+- ``cage_verdict``: class of the cage by its orbit; ``duty_simulation``: runs over a duty
 - ``target``: a run to a target accuracy; ``slip_map``: figures over speed and load
-- ``motion``: every motion and contact over time, on request; ``duty``: life over a duty by static loads, without a run
+- ``motion``: every motion and contact over time, on request
 
 Frame: the origin is the rest position of the centre of the outer ring, with x along the radial load. y is 90 degrees ahead
 in the sense of positive rotation; angles count from x. Everything is SI. Roller j runs in pocket j, whose mid-line is at the

@@ -16,9 +16,9 @@ from rbdyn.base.files import versions
 from rbdyn.base.notes import Note, Notes, merged
 from rbdyn.base.records import OverPoints, Record, derived, finite, keyed, nullable
 from rbdyn.base.words import Notice, named, part_of
-from rbdyn.dynamics.duty import load_case
 from rbdyn.dynamics.ensemble import Reporter, log, plan_of, threads_of
 from rbdyn.dynamics.figures import FIGURES
+from rbdyn.dynamics.part_figures import load_case
 from rbdyn.dynamics.simulate import simulate
 from rbdyn.life import ROLLER_EXPONENT, duty_life, life_notes, life_sheet
 from rbdyn.result import (

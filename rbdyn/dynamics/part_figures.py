@@ -1,22 +1,29 @@
 """Figures of parts of a bearing: power terms, operating clearances, contact pressures and films, life, stiffness, with their errors.
 
 Studies, limits, maps and uncertainties name them as they name the figures of the whole bearing. Each is declared once, in ``figures``.
+Life, also over a duty, and stiffness follow from static loads by ISO/TS 16281; nothing is simulated for them.
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
+from rbdyn.base.arrays import Array
 from rbdyn.base.faults import InputError, MethodError
-from rbdyn.dynamics.duty import row_stiffness, static_life
+from rbdyn.contact.hertz_line import iso_16281
 from rbdyn.dynamics.figures import PARTS, of_kind
 from rbdyn.dynamics.forces.state import INNER_LOAD, OUTER_LOAD
+from rbdyn.dynamics.parameters.model import roller_relief
 from rbdyn.dynamics.parameters.validity import race_report
 from rbdyn.dynamics.statistics.batch_means import student_factor
 from rbdyn.dynamics.statistics.metrics import Runs
+from rbdyn.life import ROLLER_EXPONENT, DutyLife, LoadCase, duty_life, turning_rings
+from rbdyn.life.rollers import ReferenceLife, RollerContacts, Stiffness, reference_life, static_loads, static_stiffness
+from rbdyn.properties.materials import equivalent_modulus
 from rbdyn.result import Quantity
 from rbdyn.scene import Scene
 from rbdyn.scene.thermal import Temperatures, at_temperatures
@@ -114,3 +121,78 @@ def _extreme(value: float, values: list[float]) -> Quantity:
     freedom = len(values) - 1
     half = float(np.std(values, ddof=1)) * student_factor(freedom)
     return Quantity(value, half, None, float(len(values)), freedom)
+
+
+def static_life(scene: Scene) -> ReferenceLife:
+    """Reference life of ISO/TS 16281 at the operating clearance, by its laminae and its own line contact.
+
+    The load is the steady one in line with the rotating one, of a schedule the largest. Gravity, form errors and a flexible support
+    are left out. Edge stresses count where the roller has a profile, as in ``motion.rating_life``.
+    """
+    drawing, geometry = scene.bearing, scene.geometry
+    angle = 2.0 * np.pi * np.arange(drawing.rollers) / drawing.rollers
+    inner, outer = static_loads(
+        static_contacts(scene, angle),
+        drawing.rollers,
+        scene.operation.largest_load_N,
+        geometry.clearance,
+        geometry.centrifugal_force,
+    )
+    return reference_life(
+        inner,
+        outer,
+        capacity=drawing.rated_capacity,
+        gamma=drawing.diameter_ratio,
+        turning=turning_rings(*scene.operation.speeds),
+        edges=drawing.roller_profile != "cylinder",
+    )
+
+
+def row_stiffness(scene: Scene, clearance: float | None = None) -> Stiffness:
+    """Stiffness of the row, mean over a pitch, by the loads, contacts and omissions of ``static_life``.
+
+    ``clearance``: diametral [m], by default the operating one. Raises MethodError where no roller carries load.
+    """
+    geometry = scene.geometry
+    return static_stiffness(
+        partial(static_contacts, scene),
+        scene.bearing.rollers,
+        scene.operation.largest_load_N,
+        geometry.clearance if clearance is None else clearance,
+        geometry.centrifugal_force,
+    )
+
+
+def static_contacts(scene: Scene, angle: Array) -> RollerContacts:
+    """Contacts of rollers at these azimuths (n,) from the load [rad]."""
+    modulus = equivalent_modulus(scene.material("roller"), scene.material("rings"))
+    line = iso_16281(modulus, scene.bearing.effective_length).stiffness
+    return RollerContacts(line, (_relief(scene, "inner", angle), _relief(scene, "outer", angle)))
+
+
+def _relief(scene: Scene, race: str, angle: Array) -> Array:
+    """Profile drop less the rise by tilt at the slice centres [m], (1, slices), or (n, slices) with a tilt."""
+    drawing, slices = scene.bearing, scene.slices
+    drop = roller_relief(scene, slices)[None]
+    if drawing.tilt == 0.0:
+        return drop
+    from rbdyn.contact.profile import slice_centres
+
+    share = drawing.inner_tilt_share if race == "inner" else 1.0 - drawing.inner_tilt_share
+    tilt = drawing.tilt * share * np.cos(angle - drawing.tilt_direction)
+    return np.asarray(drop - tilt[:, None] * slice_centres(slices, drawing.effective_length))
+
+
+def roller_duty_life(scenes: Sequence[Scene], shares: Sequence[float]) -> DutyLife:
+    """Life over a duty from the scene at each point and its share of time; loads are the radial ones.
+
+    Raises MethodError for shares that do not sum to 1.
+    """
+    cases = [load_case(scene, share) for scene, share in zip(scenes, shares, strict=True)]
+    return duty_life(cases, ROLLER_EXPONENT)
+
+
+def load_case(scene: Scene, share: float) -> LoadCase:
+    """The scene as a point of a duty with this share of the time."""
+    inner, outer = scene.operation.speeds
+    return LoadCase(share, inner - outer, scene.operation.largest_load_N, static_life(scene))

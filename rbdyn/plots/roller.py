@@ -20,8 +20,8 @@ from rbdyn.base.faults import MethodError
 from rbdyn.base.words import label
 from rbdyn.dynamics import motion
 from rbdyn.dynamics.cage_verdict import forced_orders, passing_orders
-from rbdyn.dynamics.duty import row_stiffness
 from rbdyn.dynamics.figures import PANELS
+from rbdyn.dynamics.part_figures import row_stiffness
 from rbdyn.plots import style
 from rbdyn.plots.drawing import Drawing, Shape, drawing, shapes
 

@@ -113,7 +113,7 @@ def test_map_marks_a_point_that_adds_heat_at_its_temperatures(scene):
     from pathlib import Path
 
     from rbdyn.cli.simulation_output import map_duty
-    from rbdyn.dynamics.duty import static_life
+    from rbdyn.dynamics.part_figures import static_life
     from rbdyn.dynamics.simulate import steady_scene
     from rbdyn.scene import Scene
     from rbdyn.scene.duty import duty_scenes, read_duty

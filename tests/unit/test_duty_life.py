@@ -13,7 +13,7 @@ from test_life import static_loads as by_standard
 from rbdyn.base.faults import MethodError
 from rbdyn.contact.hertz_line import iso_16281
 from rbdyn.contact.profile import logarithmic_relief, slice_centres
-from rbdyn.dynamics.duty import roller_duty_life, static_life
+from rbdyn.dynamics.part_figures import roller_duty_life, static_life
 from rbdyn.life import BALL_EXPONENT, ROLLER_EXPONENT, Life, LoadCase, duty_life, equivalent_load
 from rbdyn.life.rollers import RollerContacts, static_loads
 from rbdyn.properties.materials import MATERIALS, equivalent_modulus

@@ -14,8 +14,8 @@ from rbdyn.base.faults import InputError, RunError
 from rbdyn.base.terminal import text
 from rbdyn.cli.simulation_output import simulated_blocks
 from rbdyn.dynamics import duty_simulation
-from rbdyn.dynamics.duty import roller_duty_life
 from rbdyn.dynamics.duty_simulation import DutySimulation, simulate_duty, worst_of
+from rbdyn.dynamics.part_figures import roller_duty_life
 from rbdyn.result import Quantity
 from rbdyn.scene import Scene
 from rbdyn.scene.duty import duty_scenes, read_duty

@@ -13,7 +13,7 @@ from rbdyn.base.terminal import text as terminal_text
 from rbdyn.cli.app import _write_map as write
 from rbdyn.cli.app import map_blocks
 from rbdyn.cli.simulation_output import map_duty
-from rbdyn.dynamics.duty import static_life
+from rbdyn.dynamics.part_figures import static_life
 from rbdyn.dynamics.slip_map import PANELS, Point, SlipMap
 from rbdyn.life import life_notes
 from rbdyn.result import Quantity

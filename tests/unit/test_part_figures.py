@@ -19,8 +19,8 @@ from doe.duty import Rule
 from doe.workflow.problem import Problem
 from rbdyn.base.estimate import Estimate
 from rbdyn.base.faults import InputError
-from rbdyn.dynamics.duty import row_stiffness, static_life
 from rbdyn.dynamics.figures import PARTS, of_kind, why_missing
+from rbdyn.dynamics.part_figures import row_stiffness, static_life
 from rbdyn.dynamics.slip_map import slip_map
 from rbdyn.result import SimulationResult
 from rbdyn.scene import Scene

@@ -10,7 +10,7 @@ from rbdyn.base.page import result_page
 from rbdyn.base.terminal import text
 from rbdyn.base.words import shown
 from rbdyn.cli.simulation_output import blocks
-from rbdyn.dynamics.duty import static_life
+from rbdyn.dynamics.part_figures import static_life
 from rbdyn.dynamics.simulate import simulate
 
 QUICK = ("numerics.turns=4", "numerics.discard_turns=1", "numerics.replicates=2")

@@ -9,7 +9,7 @@ from conftest import ROOT
 
 from rbdyn.base.faults import MethodError
 from rbdyn.contact.hertz_line import iso_16281
-from rbdyn.dynamics.duty import row_stiffness
+from rbdyn.dynamics.part_figures import row_stiffness
 from rbdyn.life.rollers import RollerContacts, static_stiffness, turned
 from rbdyn.scene import Scene
 

@@ -10,7 +10,7 @@ from in_process import in_process
 
 from rbdyn.base.faults import InputError
 from rbdyn.cli.stiffness import stiffness_map
-from rbdyn.dynamics.duty import row_stiffness
+from rbdyn.dynamics.part_figures import row_stiffness
 from rbdyn.quasistatic.bearing import equilibrium
 from rbdyn.scene import BallScene, Scene
 
