@@ -5,7 +5,7 @@ those with one scene are one, so that neither the order of the tables nor a poin
 """
 
 import math
-from collections import Counter
+from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -139,7 +139,7 @@ class Duty:
         """Overrides of points with a small share of the time, whose noise hardly counts where all goals are means over it."""
         if any(rule.aggregate != "mean" for rule in self.rules.values() if rule.goal != "none"):
             return set()
-        shares = Counter[tuple[str, ...]]()
+        shares = defaultdict[tuple[str, ...], float](float)
         for name, overrides in self.overrides.items():
             shares[tuple(overrides)] += self.shares[name]
         return {overrides for overrides, share in shares.items() if share <= MINOR * max(shares.values())}

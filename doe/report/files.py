@@ -31,7 +31,7 @@ from doe.report.summary import Summary, readable
 from doe.response_surface import Surface
 from doe.response_surface.statistics import fits_of
 from doe.running.store import grouped
-from doe.workflow.confirmation import ConfirmedPoint, PickLimit, statement
+from doe.workflow.confirmation import ConfirmedPoint, PickLimit, point_words, statement
 from doe.workflow.duty import DutyAnswer
 from doe.workflow.front_record import EstimatedPoint, SearchResult, SurfaceFront, predicted_rows
 from doe.workflow.problem import Asked, Problem, Settings
@@ -101,7 +101,8 @@ def write(outcome: StudyResult, folder: Path) -> dict[str, Any]:
             save(drawn_stills, folder / name)
             pictures.append(name)
     motions = clearance.histories(outcome.scenes, DRAWN_TURNS)
-    pictures += clearance.draw_motion(motions, folder, outcome.cage_classes)
+    classes = {point_words(name): cage for name, cage in outcome.cage_classes.items()}
+    pictures += clearance.draw_motion({point_words(name): motions[name] for name in motions}, folder, classes)
     drawn = {name: clearance.drawn_motion(motion) for name, motion in motions.items()}
     texts = {"report.html": html_report(result, drawn), "answer.txt": answer_text(result)}
     for name, text in texts.items():
