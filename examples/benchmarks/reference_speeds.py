@@ -19,6 +19,7 @@ import numpy as np
 from rbdyn.base.arrays import Array
 from rbdyn.base.faults import RPM
 from rbdyn.contact.film_thickness import RollingContact
+from rbdyn.life.friction import Running
 from rbdyn.life.rollers import iso_15312_heat, skf_moments
 from rbdyn.properties.catalogue import cage_estimate, envelope, read_designation, roller_interior
 from rbdyn.properties.materials import MATERIALS, equivalent_modulus
@@ -112,7 +113,8 @@ def point(name: str, speed: float, thermal: Thermal = DEFAULTS) -> Point:
         inner_ambient=thermal.shaft_factor * shaft,
         sump=thermal.sump_factor * sump(outside, width),
     )
-    moments = skf_moments(named.series, bore, outside, speed, oil.viscosity / oil.density, load, supply="bath")
+    running = Running(bore, outside, speed, oil.viscosity / oil.density, "bath")
+    moments = skf_moments(named.series, running, load)
     rolling, sliding = moments.rolling * speed, moments.sliding * speed
     halves = {f"{race}_race_traction": 0.5 * sliding for race in ("outer", "inner")}
     halves |= {f"{race}_rolling_resistance": 0.5 * rolling for race in ("outer", "inner")}

@@ -32,6 +32,7 @@ from published.common import (
 from rbdyn import Scene
 from rbdyn.base.words import with_error
 from rbdyn.life import rollers
+from rbdyn.life.friction import Running
 from rbdyn.properties.materials import oil_at
 
 # Table 8: as designed, and the paper's optimum.
@@ -200,9 +201,8 @@ def skf_moments(
     speed_rpm: float, load_n: float, viscosity_cst: float, bore_mm: float, outside_mm: float, series: str = "2"
 ) -> tuple[float, float]:
     """Rolling and sliding frictional moment [N mm] by SKF's model with an oil jet or bath, without drag and seals."""
-    moments = rollers.skf_moments(
-        series, 1e-3 * bore_mm, 1e-3 * outside_mm, speed_rpm * math.pi / 30.0, 1e-6 * viscosity_cst, load_n
-    )
+    running = Running(1e-3 * bore_mm, 1e-3 * outside_mm, speed_rpm * math.pi / 30.0, 1e-6 * viscosity_cst)
+    moments = rollers.skf_moments(series, running, load_n)
     return 1e3 * moments.rolling, 1e3 * moments.sliding
 
 

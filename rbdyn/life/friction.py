@@ -25,6 +25,16 @@ class FrictionMoments(NamedTuple):
     sliding: float
 
 
+class Running(NamedTuple):
+    """A bearing that runs: bore and outside diameter [m], speed [rad/s], kinematic viscosity [m^2/s] and ``lubricant.supply`` of its oil."""
+
+    bore: float
+    outside: float
+    speed: float
+    viscosity: float
+    supply: str | None = None
+
+
 def inlet_heating_factor(mean_diameter: float, speed: float, viscosity: float) -> float:
     """phi_ish, reduction of the rolling moment by inlet shear heating: 1/(1 + 1.84e-9 (n d_m)^1.28 nu^0.64).
 
@@ -34,18 +44,15 @@ def inlet_heating_factor(mean_diameter: float, speed: float, viscosity: float) -
     return 1.0 / (1.0 + 1.84e-9 * fast**1.28 * (viscosity * 1e6) ** 0.64)
 
 
-def starvation_factor(
-    geometry: float, bore: float, outside: float, speed: float, viscosity: float, supply: str | None = None
-) -> float:
+def starvation_factor(geometry: float, running: Running) -> float:
     """phi_rs, reduction of the rolling moment by starvation: exp(-K_rs nu n (d + D) sqrt(K_Z/(2 (D - d)))).
 
-    K_Z of the kind of bearing, bore and outside diameter [m], speed [rad/s], kinematic viscosity [m^2/s]; ``supply`` as
-    ``lubricant.supply``.
+    ``geometry``: K_Z of the kind of bearing.
     """
-    constant = SCARCE_STARVATION if supply in SCARCE else STARVATION
-    inner, outer = bore * 1e3, outside * 1e3
+    constant = SCARCE_STARVATION if running.supply in SCARCE else STARVATION
+    inner, outer = running.bore * 1e3, running.outside * 1e3
     room = math.sqrt(geometry / (2.0 * (outer - inner)))
-    return math.exp(-constant * viscosity * 1e6 * abs(speed) / RPM * (inner + outer) * room)
+    return math.exp(-constant * running.viscosity * 1e6 * abs(running.speed) / RPM * (inner + outer) * room)
 
 
 def sliding_friction(film_friction: float, mean_diameter: float, speed: float, viscosity: float) -> float:
@@ -56,19 +63,12 @@ def sliding_friction(film_friction: float, mean_diameter: float, speed: float, v
 
 
 def _moments(
-    rolling: float,
-    sliding: float,
-    geometry: float,
-    film_friction: float,
-    bore: float,
-    outside: float,
-    speed: float,
-    viscosity: float,
-    supply: str | None,
+    rolling: float, sliding: float, geometry: float, film_friction: float, running: Running
 ) -> FrictionMoments:
     """M_rr = phi_ish phi_rs G_rr (nu n)^0.6 and M_sl = G_sl mu_sl from the variables G_rr and G_sl of SKF's table 2a."""
+    bore, outside, speed, viscosity, _ = running
     mean, flow = 0.5 * (bore + outside), abs(speed) / RPM * viscosity * 1e6
-    starved = starvation_factor(geometry, bore, outside, speed, viscosity, supply)
+    starved = starvation_factor(geometry, running)
     reduction = inlet_heating_factor(mean, speed, viscosity) * starved
     slides = sliding_friction(film_friction, mean, speed, viscosity)
     return FrictionMoments(1e-3 * reduction * rolling * flow**0.6, 1e-3 * sliding * slides)
@@ -115,17 +115,13 @@ def deep_groove_angle(axial_load: float, static_capacity: float) -> float:
 
 def deep_groove_moments(
     series: str,
-    bore: float,
-    outside: float,
-    speed: float,
-    viscosity: float,
+    running: Running,
     radial_load: float,
     axial_load: float,
     static_capacity: float,
     *,
     preload: float = 0.0,
     film_friction: float = MINERAL_FILM,
-    supply: str | None = None,
 ) -> FrictionMoments:
     """Frictional moments of a single row deep groove ball bearing.
 
@@ -134,11 +130,11 @@ def deep_groove_moments(
 
     ``preload``: sum of the ball loads [N] beyond those that carry the load, by lost clearance. It is no part of SKF's model, which
     is for normal clearance. It loads all balls alike, as an axial load does, so it is added to F_a/sin alpha_F; it slides as a radial
-    load of 1/1.80 of it. Lengths [m], speed [rad/s], kinematic viscosity [m^2/s], loads >= 0 and capacity C0 [N]. Raises KeyError
+    load of 1/1.80 of it. Loads >= 0 and capacity C0 [N]. Raises KeyError
     for a series that is not in ``DEEP_GROOVE``.
     """
     r1, r2, s1, s2 = DEEP_GROOVE[series]
-    mean = 0.5e3 * (bore + outside)
+    mean = 0.5e3 * (running.bore + running.outside)
     fifth = radial_load**5 + (preload / PRELOAD_SLIDING) ** 5
     if axial_load > NO_AXIAL_LOAD * static_capacity:
         sine = math.sin(min(deep_groove_angle(axial_load, static_capacity), 0.5 * math.pi))
@@ -148,20 +144,16 @@ def deep_groove_moments(
         rolling = radial_load + r2 * preload
         sliding = s1 * mean**-0.26 * fifth ** (1.0 / 3.0)
     rolling = r1 * mean**1.96 * rolling**0.54
-    return _moments(rolling, sliding, DEEP_GROOVE_GEOMETRY, film_friction, bore, outside, speed, viscosity, supply)
+    return _moments(rolling, sliding, DEEP_GROOVE_GEOMETRY, film_friction, running)
 
 
 def angular_contact_moments(
-    bore: float,
-    outside: float,
-    speed: float,
-    viscosity: float,
+    running: Running,
     radial_load: float,
     axial_load: float,
     *,
     density_ratio: float = 1.0,
     film_friction: float = MINERAL_FILM,
-    supply: str | None = None,
 ) -> FrictionMoments:
     """Frictional moments of a single row angular contact ball bearing, of any contact angle.
 
@@ -173,8 +165,8 @@ def angular_contact_moments(
     0.33 to 0.21 times.
     """
     (r1, r2, r3), (s1, s2, s3) = ANGULAR_ROLLING, ANGULAR_SLIDING
-    mean = 0.5e3 * (bore + outside)
-    turning = density_ratio * mean**4 * (speed / RPM) ** 2
+    mean = 0.5e3 * (running.bore + running.outside)
+    turning = density_ratio * mean**4 * (running.speed / RPM) ** 2
     rolling = r1 * mean**1.97 * (radial_load + r3 * turning + r2 * axial_load) ** 0.54
     sliding = s1 * mean**0.26 * ((radial_load + s3 * turning) ** (4.0 / 3.0) + s2 * axial_load ** (4.0 / 3.0))
-    return _moments(rolling, sliding, ANGULAR_GEOMETRY, film_friction, bore, outside, speed, viscosity, supply)
+    return _moments(rolling, sliding, ANGULAR_GEOMETRY, film_friction, running)

@@ -20,7 +20,7 @@ import numpy as np
 from rbdyn.base.arrays import Array
 from rbdyn.base.faults import RPM, MethodError
 from rbdyn.life import Life, Turning
-from rbdyn.life.friction import FrictionMoments, inlet_heating_factor, sliding_friction, starvation_factor
+from rbdyn.life.friction import FrictionMoments, Running, inlet_heating_factor, sliding_friction, starvation_factor
 from rbdyn.properties.catalogue import Envelope
 
 # Life of a race falls with the fourth power of its load; 9/8 is the slope of the Weibull line.
@@ -326,25 +326,16 @@ HEAT_FLOW, LARGE_SEAT, LARGE_SEAT_EXPONENT = 0.016, 5e4, -0.34
 SEAT_RISE = 50.0  # [K]
 
 
-def skf_moments(
-    series: str,
-    bore: float,
-    outside: float,
-    speed: float,
-    viscosity: float,
-    radial_load: float,
-    axial_load: float = 0.0,
-    supply: str | None = None,
-) -> FrictionMoments:
+def skf_moments(series: str, running: Running, radial_load: float, axial_load: float = 0.0) -> FrictionMoments:
     """Frictional moments of a bearing with a cage by SKF's model.
 
     M_rr = phi_ish phi_rs R1 d_m^2.41 F_r^0.31 (nu n)^0.6 and M_sl = (S1 d_m^0.9 F_a + S2 d_m F_r) mu_sl, d_m = (d + D)/2.
-    Bore and outside diameter [m], speed [rad/s], kinematic viscosity [m^2/s], loads [N]. Raises KeyError for a series
-    that is not in ``SERIES``.
+    Loads [N]. Raises KeyError for a series that is not in ``SERIES``.
     """
+    bore, outside, speed, viscosity, _ = running
     factors, mean = SERIES[series], 0.5 * (bore + outside)
     diameter, flow = mean * 1e3, abs(speed) / RPM * viscosity * 1e6
-    starved = starvation_factor(ROLLER_GEOMETRY, bore, outside, speed, viscosity, supply)
+    starved = starvation_factor(ROLLER_GEOMETRY, running)
     reduction = inlet_heating_factor(mean, speed, viscosity) * starved
     rolling = reduction * factors.rolling * diameter**2.41 * radial_load**0.31 * flow**0.6
     sliding = factors.sliding * diameter**0.9 * axial_load + RADIAL_SLIDING * diameter * radial_load

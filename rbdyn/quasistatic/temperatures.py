@@ -127,32 +127,28 @@ def loads_of(scene: SingleRowScene, model: RowModel, solution: Solution) -> Load
     return Loads(radial, z, max(float(solution.inner_load.sum()) - carries, 0.0))
 
 
+def running_of(scene: SingleRowScene) -> friction.Running:
+    """Sizes, speed and oil of a row at the temperature of its oil, for SKF's model."""
+    lubricant, mounting, (inner, outer) = scene.lubricant, scene.mounting, scene.operation.speeds
+    assert lubricant is not None and mounting is not None
+    oil, sizes = lubricant.in_service, (mounting.bore, mounting.outside_diameter)
+    return friction.Running(*sizes, inner - outer, oil.viscosity / oil.density, lubricant.supply)
+
+
 def friction_of(scene: SingleRowScene, model: RowModel, loads: Loads) -> friction.FrictionMoments:
     """SKF's moments [N m] of a row at the temperature of its oil."""
-    lubricant, mounting = scene.lubricant, scene.mounting
-    assert lubricant is not None and mounting is not None
-    oil, (inner, outer) = lubricant.in_service, scene.operation.speeds
-    sizes = mounting.bore, mounting.outside_diameter
-    at = *sizes, inner - outer, oil.viscosity / oil.density
+    lubricant, running = scene.lubricant, running_of(scene)
+    assert lubricant is not None
     film = friction.MINERAL_FILM if lubricant.base_oil_name in MINERAL else friction.SYNTHETIC_FILM
     if scene.bearing.kind == "deep_groove_ball":
-        series = SERIES[diameter_series(*(1e3 * size for size in sizes))]
+        series = SERIES[diameter_series(1e3 * running.bore, 1e3 * running.outside)]
         assert series in friction.DEEP_GROOVE
         capacity = static_capacity_of(scene, model)
         return friction.deep_groove_moments(
-            series,
-            *at,
-            loads.radial,
-            loads.axial,
-            capacity,
-            preload=loads.preload,
-            film_friction=film,
-            supply=lubricant.supply,
+            series, running, loads.radial, loads.axial, capacity, preload=loads.preload, film_friction=film
         )
     ratio = scene.material("ball").density / MATERIALS["bearing_steel"].density
-    return friction.angular_contact_moments(
-        *at, loads.radial, loads.axial, density_ratio=ratio, film_friction=film, supply=lubricant.supply
-    )
+    return friction.angular_contact_moments(running, loads.radial, loads.axial, density_ratio=ratio, film_friction=film)
 
 
 def powers_of(scene: SingleRowScene, moments: friction.FrictionMoments) -> Array:
@@ -446,11 +442,7 @@ def _notes(scene: SingleRowScene, found: Heat, ranges: Ranges | None) -> Notes:
 
 def starvation_note(hot: SingleRowScene, subject: str) -> Notes:
     """A note where SKF's starvation factor leaves hardly any rolling friction of a scene at stated temperatures."""
-    lubricant, mounting, (inner, outer) = hot.lubricant, hot.mounting, hot.operation.speeds
-    assert lubricant is not None and mounting is not None
-    oil = lubricant.in_service
-    sizes = mounting.bore, mounting.outside_diameter, inner - outer, oil.viscosity / oil.density
-    factor = friction.starvation_factor(GEOMETRIES[hot.bearing.kind], *sizes, lubricant.supply)
+    factor = friction.starvation_factor(GEOMETRIES[hot.bearing.kind], running_of(hot))
     if factor >= STARVED:
         return ()
     sentence = (

@@ -41,7 +41,7 @@ def test_literature_example_of_the_maker():
     speed, oil = 3500.0 * RPM, 68e-6
     heated, starved = (
         friction.inlet_heating_factor(0.06, speed, oil),
-        friction.starvation_factor(5.5, 0.04, 0.08, speed, oil),
+        friction.starvation_factor(5.5, friction.Running(0.04, 0.08, speed, oil)),
     )
     assert heated == pytest.approx(0.85, abs=0.005) and starved == pytest.approx(0.8, abs=0.005)
     assert 0.26 * (68 * 3500) ** 0.6 * heated * starved == pytest.approx(0.85 * 0.8 * 437, rel=0.01)
@@ -62,8 +62,8 @@ def test_literature_deep_groove_moments(series):
                 g_sl = 1e-3 * s1 * mean**-0.145 * (radial**5 + s2 * mean**1.5 / sine * axial**4) ** (1 / 3)
             else:
                 g_rr, g_sl = 1e-7 * r1 * mean**1.96 * radial**0.54, 1e-3 * s1 * mean**-0.26 * radial ** (5 / 3)
-            at = 1e-3 * bore, 1e-3 * outside, rpm * RPM, 1e-6 * cst
-            moments = friction.deep_groove_moments(series, *at, radial, axial, capacity, supply=supply)
+            at = friction.Running(1e-3 * bore, 1e-3 * outside, rpm * RPM, 1e-6 * cst, supply)
+            moments = friction.deep_groove_moments(series, at, radial, axial, capacity)
             assert [1e3 * moment for moment in moments] == pytest.approx([g_rr * rolls, g_sl * slides], rel=1e-12)
 
 
@@ -75,14 +75,14 @@ def test_literature_angular_contact_moments():
         rolling, sliding = (radial + share * k * mean**4 * rpm**2 for k in (1.90e-12, 1.91e-12))
         g_rr = 5.03e-7 * mean**1.97 * (rolling + 1.97 * axial) ** 0.54
         g_sl = 1.30e-2 * mean**0.26 * (sliding ** (4 / 3) + 0.68 * axial ** (4 / 3))
-        at = 1e-3 * bore, 1e-3 * outside, rpm * RPM, 1e-6 * cst
-        moments = friction.angular_contact_moments(*at, radial, axial, density_ratio=share, film_friction=0.04)
+        at = friction.Running(1e-3 * bore, 1e-3 * outside, rpm * RPM, 1e-6 * cst)
+        moments = friction.angular_contact_moments(at, radial, axial, density_ratio=share, film_friction=0.04)
         assert [1e3 * moment for moment in moments] == pytest.approx([g_rr * rolls, g_sl * slides], rel=1e-12)
 
 
 def test_unit_first_axial_load():
     """Unit: rolling is continuous at the first axial load, sliding steps by d_m^0.115 as in the maker's form."""
-    at = "62", 0.04, 0.08, 6000.0 * RPM, 12e-6, 1000.0
+    at = "62", friction.Running(0.04, 0.08, 6000.0 * RPM, 12e-6), 1000.0
     without, least = (friction.deep_groove_moments(*at, axial, 19000.0) for axial in (0.0, 1e-4))
     assert least.rolling == pytest.approx(without.rolling, rel=1e-4)
     assert least.sliding / without.sliding == pytest.approx(60.0**0.115, rel=1e-6)
@@ -96,7 +96,7 @@ def test_unit_preload_loads_all_balls_alike():
     rolling, sliding = (0.5 * sum(math.cos(a) ** (1.5 * power) for a in angles) / places for power in (0.54, 5.0 / 3.0))
     assert 1.0 / (4.37 * rolling ** (1.0 / 0.54)) == pytest.approx(friction.DEEP_GROOVE["62"].axial_rolling, abs=0.005)
     assert 4.37 * sliding**0.6 == pytest.approx(friction.PRELOAD_SLIDING, abs=0.005)
-    at = "62", 0.04, 0.08, 6000.0 * RPM, 12e-6
+    at = "62", friction.Running(0.04, 0.08, 6000.0 * RPM, 12e-6)
     both = friction.deep_groove_moments(*at, 1000.0, 0.0, 19000.0, preload=500.0)
     more = friction.deep_groove_moments(*at, 1000.0 + 1.7 * 500.0, 0.0, 19000.0)
     assert both.rolling == pytest.approx(more.rolling) and both.sliding < more.sliding
@@ -106,13 +106,12 @@ def test_literature_heat_at_the_reference_speed():
     """Literature: at 0.05 C0 and 12 mm2/s SKF's friction is 0.67 to 0.93 of the heat of ISO 15312, of angular contact 1.9 to 2.7."""
     ratios = {"deep": [], "angular": []}
     for series, bore, outside, width, capacity, rpm in DEEP:
-        at = 1e-3 * bore, 1e-3 * outside, rpm * RPM, 12e-6
-        moments = friction.deep_groove_moments(series, *at, 50.0 * capacity, 0.0, 1e3 * capacity, supply="bath")
+        at = friction.Running(1e-3 * bore, 1e-3 * outside, rpm * RPM, 12e-6, "bath")
+        moments = friction.deep_groove_moments(series, at, 50.0 * capacity, 0.0, 1e3 * capacity)
         ratios["deep"].append(rpm * RPM * sum(moments) / iso_15312_heat(Envelope(bore, outside, width)))
     for bore, outside, width, capacity, rpm in ANGULAR:
-        moments = friction.angular_contact_moments(
-            1e-3 * bore, 1e-3 * outside, rpm * RPM, 12e-6, 50.0 * capacity, 0.0, supply="bath"
-        )
+        at = friction.Running(1e-3 * bore, 1e-3 * outside, rpm * RPM, 12e-6, "bath")
+        moments = friction.angular_contact_moments(at, 50.0 * capacity, 0.0)
         ratios["angular"].append(rpm * RPM * sum(moments) / iso_15312_heat(Envelope(bore, outside, width)))
     assert [min(ratios["deep"]), max(ratios["deep"])] == pytest.approx([0.67, 0.93], abs=0.01)
     assert [min(ratios["angular"]), max(ratios["angular"])] == pytest.approx([1.89, 2.70], abs=0.01)
@@ -128,10 +127,10 @@ def test_literature_nasa_losses_are_out_of_reach(rpm, kelvin, measured, ratio, s
     The outside diameter of 62 mm is from memory. The oil is at the outlet temperature of its balance.
     """
     oil = oil_at("MIL-L-23699", kelvin - 273.15)
-    at = 0.035, 0.062, rpm * RPM, oil.viscosity / oil.density, 0.0, 667.0
+    at = friction.Running(0.035, 0.062, rpm * RPM, oil.viscosity / oil.density, "jet")
     for share, expected in ((1.0, ratio), (0.0, still)):
         moments = friction.angular_contact_moments(
-            *at, density_ratio=share, film_friction=friction.SYNTHETIC_FILM, supply="jet"
+            at, 0.0, 667.0, density_ratio=share, film_friction=friction.SYNTHETIC_FILM
         )
         assert rpm * RPM * sum(moments) / measured == pytest.approx(expected, rel=0.03)
 

@@ -49,8 +49,8 @@ def test_literature_skf_moments(bearing):
     for speed in (0.01 * rpm, 0.3 * rpm, rpm):
         for cst in (3.0, 11.0, 60.0):
             for supply, k_rs in ((None, 3e-8), ("bath", 3e-8), ("jet", 3e-8), ("oil_air", 6e-8), ("grease", 6e-8)):
-                lengths = 1e-3 * bore, 1e-3 * outside
-                found = rollers.skf_moments(series, *lengths, speed * RPM, 1e-6 * cst, load, supply=supply)
+                running = friction.Running(1e-3 * bore, 1e-3 * outside, speed * RPM, 1e-6 * cst, supply)
+                found = rollers.skf_moments(series, running, load)
                 expected = moments_in_mm(bore, outside, first, speed, load, cst, k_rs)
                 assert [1e3 * each for each in found] == pytest.approx(expected, rel=1e-12)
 
@@ -81,16 +81,20 @@ def test_unit_limits_of_the_factors():
     """Unit: slow bearings are neither heated nor starved and slide at the boundary, fast ones in the film; axial load slides."""
     slow, thick = 1e-6 * RPM, 1e-4
     rollers_geometry, rollers_film = rollers.ROLLER_GEOMETRY, rollers.FILM_FRICTION
-    sizes = rollers_geometry, 0.05, 0.09
+    sizes = 0.05, 0.09
     assert friction.inlet_heating_factor(0.07, slow, thick) == pytest.approx(1.0, abs=1e-9)
-    assert friction.starvation_factor(*sizes, slow, thick, "grease") == pytest.approx(1.0, abs=1e-9)
+    assert friction.starvation_factor(
+        rollers_geometry, friction.Running(*sizes, slow, thick, "grease")
+    ) == pytest.approx(1.0, abs=1e-9)
     assert friction.sliding_friction(rollers_film, 0.07, slow, thick) == pytest.approx(0.12)
     assert friction.sliding_friction(rollers_film, 0.07, 1e5 * RPM, thick) == pytest.approx(0.02)
     fast = 8500.0 * RPM, 11e-6
-    bath = friction.starvation_factor(*sizes, *fast, "bath")
-    assert friction.starvation_factor(*sizes, *fast, "grease") == pytest.approx(bath**2)
+    bath = friction.starvation_factor(rollers_geometry, friction.Running(*sizes, *fast, "bath"))
+    assert friction.starvation_factor(rollers_geometry, friction.Running(*sizes, *fast, "grease")) == pytest.approx(
+        bath**2
+    )
     assert friction.inlet_heating_factor(0.07, *fast) < 1.0 and bath < 1.0
-    radial, both = (rollers.skf_moments("2", 0.05, 0.09, *fast, 3e3, axial) for axial in (0.0, 500.0))
+    radial, both = (rollers.skf_moments("2", friction.Running(*sizes, *fast), 3e3, axial) for axial in (0.0, 500.0))
     assert both.rolling == radial.rolling
     assert both.sliding - radial.sliding == pytest.approx(1e-3 * 0.16 * 70.0**0.9 * 500.0 * 0.02, rel=1e-3)
 

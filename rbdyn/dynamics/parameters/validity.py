@@ -16,6 +16,7 @@ from rbdyn.contact.hertz_line import ROLLERS, palmgren, pressure_notes
 from rbdyn.contact.rolling_resistance import THINNEST_LAYER, inlet
 from rbdyn.dynamics.forces.bodies import AIR_DENSITY
 from rbdyn.dynamics.parameters.model import film_report, oil_layer, race_contact_law, rolling_contacts
+from rbdyn.life.friction import Running
 from rbdyn.life.rollers import REFERENCE_SPEED, SERIES, iso_15312_heat, minimum_loads, skf_moments, static_capacity
 from rbdyn.properties.materials import SOFTEST_METAL, equivalent_modulus
 from rbdyn.scene import Scene
@@ -99,8 +100,8 @@ def friction_check(scene: Scene, power_loss: float) -> dict[str, float | None] |
     inner, outer = scene.operation.speeds
     oil, load = scene.oil(), scene.operation.largest_load_N
     lengths = 1e-3 * sizes.bore, 1e-3 * sizes.outside
-    viscosity, supply = oil.viscosity / oil.density, scene.lubricant.supply
-    moments = skf_moments(named.series, *lengths, inner - outer, viscosity, load, supply=supply)
+    running = Running(*lengths, inner - outer, oil.viscosity / oil.density, scene.lubricant.supply)
+    moments = skf_moments(named.series, running, load)
     power = sum(moments) * abs(inner - outer)
     return {
         "skf_power_W": power,
