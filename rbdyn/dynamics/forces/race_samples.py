@@ -13,25 +13,9 @@ import math
 from typing import NamedTuple
 
 from rbdyn.compiled.kernel import kernel, law, routine
+from rbdyn.dynamics.forces import state
 from rbdyn.dynamics.forces.equations import motions
 from rbdyn.dynamics.forces.races import RaceWrench, race_observed
-from rbdyn.dynamics.forces.state import (
-    ENTRY_ENERGIES,
-    ENTRY_ENERGY,
-    ENTRY_OUTSIDE,
-    ENTRY_SAMPLES,
-    ENTRY_SLIP,
-    ENTRY_SLIPS,
-    INNER_DENSITIES,
-    INNER_FLASHES,
-    OUTER_DENSITIES,
-    OUTER_FLASHES,
-    SAMPLE_BINS,
-    SAMPLE_LOWEST,
-    SAMPLE_STEPS,
-    SAMPLES_NUMBER,
-    SAMPLES_TOTAL,
-)
 
 
 class NoRaceSamples(NamedTuple):
@@ -91,23 +75,23 @@ def sample_races(samples, bearing, y, number, followed, sums):
         booked = (j + number) % ROUNDS == 0
         if booked:
             contact = race_observed(bearing.outer, 1.0, bearing, y, j, outer)
-            book_contact(samples.outer, contact, OUTER_DENSITIES, OUTER_FLASHES, sums)
+            book_contact(samples.outer, contact, state.OUTER_DENSITIES, state.OUTER_FLASHES, sums)
         dx, dy = y[j] - inner.x, y[z + j] - inner.y
         contact = RaceWrench(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
         if dx * dx + dy * dy < reach2:
             contact = race_observed(bearing.inner, -1.0, bearing, y, j, inner)
             if booked:
-                book_contact(samples.inner, contact, INNER_DENSITIES, INNER_FLASHES, sums)
+                book_contact(samples.inner, contact, state.INNER_DENSITIES, state.INNER_FLASHES, sums)
         follow_entry(samples, contact, j, followed, sums)
 
 
 @kernel
 def book_value(sums, row, value):
     """Add a value to number, total and logarithmic histogram in row ``row`` of ``sums``."""
-    place = SAMPLE_STEPS * math.log10(max(value, SAMPLE_LOWEST) / SAMPLE_LOWEST)
-    sums[row, SAMPLES_NUMBER] += 1.0
-    sums[row, SAMPLES_TOTAL] += value
-    sums[row, SAMPLES_TOTAL + 1 + min(int(place), SAMPLE_BINS - 1)] += 1.0
+    place = state.SAMPLE_STEPS * math.log10(max(value, state.SAMPLE_LOWEST) / state.SAMPLE_LOWEST)
+    sums[row, state.SAMPLES_NUMBER] += 1.0
+    sums[row, state.SAMPLES_TOTAL] += value
+    sums[row, state.SAMPLES_TOTAL + 1 + min(int(place), state.SAMPLE_BINS - 1)] += 1.0
 
 
 @kernel
@@ -129,18 +113,18 @@ def follow_entry(samples, contact, j, followed, sums):
     ``ENTRY_OUTSIDE``: whether its load was below the limit since. ``ENTRY_SAMPLES``: samples since its last entry. ``ENTRY_SLIP``:
     its slip there, 0 where that entry has ended.
     """
-    followed[ENTRY_SAMPLES, j] += 1.0
+    followed[state.ENTRY_SAMPLES, j] += 1.0
     slip = abs(contact.slip)
-    if followed[ENTRY_SLIP, j] == 0.0:
-        outside, rested = followed[ENTRY_OUTSIDE, j] > 0.0, followed[ENTRY_SAMPLES, j] > samples.pause
-        followed[ENTRY_OUTSIDE, j] = 1.0 if contact.load < samples.entry_load else 0.0
+    if followed[state.ENTRY_SLIP, j] == 0.0:
+        outside, rested = followed[state.ENTRY_OUTSIDE, j] > 0.0, followed[state.ENTRY_SAMPLES, j] > samples.pause
+        followed[state.ENTRY_OUTSIDE, j] = 1.0 if contact.load < samples.entry_load else 0.0
         if outside and rested and contact.load >= samples.entry_load:
-            followed[ENTRY_SLIP, j], followed[ENTRY_ENERGY, j] = max(slip, SAMPLE_LOWEST), 0.0
-            followed[ENTRY_SAMPLES, j] = 0.0
-    if followed[ENTRY_SLIP, j] > 0.0:
+            followed[state.ENTRY_SLIP, j], followed[state.ENTRY_ENERGY, j] = max(slip, state.SAMPLE_LOWEST), 0.0
+            followed[state.ENTRY_SAMPLES, j] = 0.0
+    if followed[state.ENTRY_SLIP, j] > 0.0:
         if slip < samples.rolling_slip or contact.load < 0.5 * samples.entry_load:
-            book_value(sums, ENTRY_SLIPS, followed[ENTRY_SLIP, j])
-            book_value(sums, ENTRY_ENERGIES, followed[ENTRY_ENERGY, j])
-            followed[ENTRY_SLIP, j] = 0.0
+            book_value(sums, state.ENTRY_SLIPS, followed[state.ENTRY_SLIP, j])
+            book_value(sums, state.ENTRY_ENERGIES, followed[state.ENTRY_ENERGY, j])
+            followed[state.ENTRY_SLIP, j] = 0.0
         else:
-            followed[ENTRY_ENERGY, j] += contact.traction * samples.spacing
+            followed[state.ENTRY_ENERGY, j] += contact.traction * samples.spacing

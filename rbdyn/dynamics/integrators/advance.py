@@ -22,26 +22,11 @@ from numpy.typing import NDArray
 
 from rbdyn.compiled.elementary import rough_power
 from rbdyn.compiled.kernel import entry, kernel, law, routine
+from rbdyn.dynamics.forces import state
 from rbdyn.dynamics.forces.equations import pocket_loads, roller_count
 from rbdyn.dynamics.forces.impacts import book_impacts
 from rbdyn.dynamics.forces.race_lanes import Scratch, scratch
 from rbdyn.dynamics.forces.race_samples import book_races
-from rbdyn.dynamics.forces.state import (
-    CAGE_VX,
-    CAGE_VY,
-    CAGE_X,
-    CAGE_Y,
-    FOLLOWED,
-    IMPACT_SUMS,
-    INNER_LOAD,
-    LOADS,
-    POCKET_CONTACT_LOAD,
-    POCKET_LOAD,
-    ROLLER_STATES,
-    SAMPLE_BINS,
-    SAMPLED,
-    SAMPLES_TOTAL,
-)
 from rbdyn.losses import POWERS
 
 # Places in ``Carry.clock``: time, next step, next sample time [s], error of the last step over the tolerance, rate of the
@@ -137,9 +122,9 @@ def carry_from(y: NDArray[np.float64], rollers: int, first_step: float, method: 
     """Memory of an integration from the state ``y`` on, which tries ``first_step`` [s] first."""
     clock = np.zeros(CLOCK)
     clock[STEP], clock[ERROR], clock[TRACED] = first_step, PI_START_ERROR, math.inf
-    k, power, loads = (np.zeros((ROWS, columns)) for columns in (y.size, POWERS, LOADS))
+    k, power, loads = (np.zeros((ROWS, columns)) for columns in (y.size, POWERS, state.LOADS))
     counts = np.zeros(COUNTS, dtype=np.int64)
-    followed, stiffness, trace = np.zeros((FOLLOWED, rollers)), np.zeros(STIFFNESS), trace_of([], math.inf, 0)
+    followed, stiffness, trace = np.zeros((state.FOLLOWED, rollers)), np.zeros(STIFFNESS), trace_of([], math.inf, 0)
     return Carry(
         y, k, np.zeros(y.size), power, loads, scratch(rollers), clock, counts, stiffness, followed, method, trace
     )
@@ -147,9 +132,9 @@ def carry_from(y: NDArray[np.float64], rollers: int, first_step: float, method: 
 
 def empty_tally(rollers: int, followed: bool = True, sampled: bool = True) -> Tally:
     """A tally of nothing of so many rollers; without sums of impacts unless these are ``followed``, of race contacts unless ``sampled``."""
-    impacts = np.zeros((rollers * followed, IMPACT_SUMS))
-    races = np.zeros((SAMPLED * sampled, SAMPLES_TOTAL + 1 + SAMPLE_BINS))
-    return Tally(np.zeros(POWERS), np.zeros(LOADS), np.zeros(LOADS), np.zeros(WHIRL), impacts, races)
+    impacts = np.zeros((rollers * followed, state.IMPACT_SUMS))
+    races = np.zeros((state.SAMPLED * sampled, state.SAMPLES_TOTAL + 1 + state.SAMPLE_BINS))
+    return Tally(np.zeros(POWERS), np.zeros(state.LOADS), np.zeros(state.LOADS), np.zeros(WHIRL), impacts, races)
 
 
 SAFETY, SHRINK, GROW = 0.9, 0.2, 10.0
@@ -206,8 +191,8 @@ def book_whirl(whirl, x, y, vx, vy):
 @kernel
 def book_point(values, point, loads, row):
     """Take the pocket loads in row ``row`` as those at a point of a step."""
-    values[0, point] = loads[row, POCKET_LOAD]
-    values[1, point] = loads[row, POCKET_CONTACT_LOAD]
+    values[0, point] = loads[row, state.POCKET_LOAD]
+    values[1, point] = loads[row, state.POCKET_CONTACT_LOAD]
 
 
 @routine
@@ -220,7 +205,7 @@ def book_peaks(values, start, h, tally):
     last = values.shape[1] - 1
     # Of a length that the compiler does not know: unrolled, this would be compiled twice.
     for row in range(values.shape[0]):
-        force = POCKET_CONTACT_LOAD if row else POCKET_LOAD
+        force = state.POCKET_CONTACT_LOAD if row else state.POCKET_LOAD
         best, place, spacing = 0.0, 0, 1.0 / last
         for p in range(last + 1):
             if values[row, p] > best:
@@ -271,7 +256,7 @@ def book_trace(carry, h):
                 i = trace.components[c]
                 trace.samples[row, c] = interpolate(method, carry.y, carry.stage, carry.k, h, theta, i)
             trace.counts[0] += 1
-            trace.counts[1] += carry.loads[method.last, INNER_LOAD] > 0.0
+            trace.counts[1] += carry.loads[method.last, state.INNER_LOAD] > 0.0
         clock[TRACED] += trace.spacing
 
 
@@ -286,21 +271,21 @@ def keep(method, body, y, stage, k, power, loads, clock, work, largest, largest_
     time = clock[NOW]
     on_wall = contact = 0.0
     for s in range(1, method.last + 1):
-        on_wall = max(on_wall, loads[s, POCKET_LOAD])
-        contact = max(contact, loads[s, POCKET_CONTACT_LOAD])
-    for force in range(LOADS):
+        on_wall = max(on_wall, loads[s, state.POCKET_LOAD])
+        contact = max(contact, loads[s, state.POCKET_CONTACT_LOAD])
+    for force in range(state.LOADS):
         if loads[method.last, force] > largest[force]:
             largest[force] = loads[method.last, force]
             largest_time[force] = time + h
     while clock[SAMPLE] <= time + h:
         theta = (clock[SAMPLE] - time) / h
-        cage_x = interpolate(method, y, stage, k, h, theta, body + CAGE_X)
-        cage_y = interpolate(method, y, stage, k, h, theta, body + CAGE_Y)
-        vx = interpolate(method, y, stage, k, h, theta, body + CAGE_VX)
-        vy = interpolate(method, y, stage, k, h, theta, body + CAGE_VY)
+        cage_x = interpolate(method, y, stage, k, h, theta, body + state.CAGE_X)
+        cage_y = interpolate(method, y, stage, k, h, theta, body + state.CAGE_Y)
+        vx = interpolate(method, y, stage, k, h, theta, body + state.CAGE_VX)
+        vy = interpolate(method, y, stage, k, h, theta, body + state.CAGE_VY)
         book_whirl(whirl, cage_x, cage_y, vx, vy)
         clock[SAMPLE] += sample_step
-    return on_wall > largest[POCKET_LOAD] or contact > largest[POCKET_CONTACT_LOAD]
+    return on_wall > largest[state.POCKET_LOAD] or contact > largest[state.POCKET_CONTACT_LOAD]
 
 
 @kernel
@@ -311,7 +296,7 @@ def end_to_start(method, y, stage, k, power, loads):
         k[0, i] = k[method.last, i]
     for p in range(POWERS):
         power[0, p] = power[method.last, p]
-    for force in range(LOADS):
+    for force in range(state.LOADS):
         loads[0, force] = loads[method.last, force]
 
 
@@ -355,7 +340,7 @@ def steps_to(bearing, control, carry, tally, t_end, sample_step):
             book_impacts(bearing.impacts, bearing, y, scratch.gap, followed, impacts)
             if keep(
                 method,
-                ROLLER_STATES * z,
+                state.ROLLER_STATES * z,
                 y,
                 stage,
                 k,
