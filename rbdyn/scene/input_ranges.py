@@ -107,22 +107,22 @@ def input_ranges(
     return Ranges(figures, tuple(sets), float(np.mean(table.max(axis=1) >= HOTTEST)))
 
 
-def course_ranges(
-    rows: "Warming", figures: Mapping[str, Array], greatest: Collection[str] = (DIFFERENCE,)
-) -> dict[str, tuple[float, ...]]:
-    """Ranges of least figures (rows, machines), of the ``greatest`` ones, of their times, and of the time to the last temperatures.
+def course_ranges(rows: "Warming", figures: Mapping[str, Array]) -> dict[str, tuple[float, ...]]:
+    """Ranges of least figures (rows, machines) and of their times, of the largest lead of the inner ring, and of the time to the last
+    temperatures.
 
     A time that one in twenty of the machines does not have has none.
     """
-    from rbdyn.thermal.start import STEADY, settled_times
+    from rbdyn.thermal.start import STEADY, leasts_of, settled_times
 
     found = {}
     for name, column in figures.items():
-        low = -column if name in greatest else column
-        found[name] = column.max(axis=0) if name in greatest else column.min(axis=0)
-        inside = np.minimum(low[0], low[-1]) - low.min(axis=0) > 1e-3 * np.ptp(low, axis=0)
-        found[f"{name}_time_s"] = np.where(inside, rows.times[low.argmin(axis=0)], np.nan)
-    found.pop(f"{DIFFERENCE}_time_s")
+        if name == DIFFERENCE:
+            found[name] = column.max(axis=0)
+            continue
+        found[name] = column.min(axis=0)
+        *_, inside = leasts_of(rows.times, column)
+        found[f"{name}_time_s"] = np.where(inside, rows.times[column.argmin(axis=0)], np.nan)
     found["time_to_steady_s"] = settled_times(rows.times, rows.temperatures, STEADY)
     return {
         name: tuple(np.nanquantile(column, QUANTILES).tolist())
