@@ -17,20 +17,9 @@ from numpy.typing import NDArray
 
 from rbdyn.base.arrays import Array
 from rbdyn.compiled.kernel import entry, routine
+from rbdyn.quasistatic.row import newton
 from rbdyn.quasistatic.row.ball import Control, ball_forces, deflection, has_race_control
 from rbdyn.quasistatic.row.equilibrium import FIGURES, OK, Solution, fill_figures, solution_of
-from rbdyn.quasistatic.row.newton import (
-    CONVEX_MARCH,
-    STEPS,
-    Task,
-    boundary_conditions,
-    descend,
-    go_to,
-    march,
-    rough_residual,
-    space,
-    start_afresh,
-)
 from rbdyn.quasistatic.row.ring import LOADED, RING, Row, assemble, groove_centre
 
 
@@ -54,7 +43,7 @@ class System(NamedTuple):
 
 def system_of(row: Row, load: Array, constraint: Array | None = None) -> System:
     """The system of ``equilibrium.solve(row, ..., load, constraint)``."""
-    force, free, displacement = boundary_conditions(row, load, constraint)
+    force, free, displacement = newton.boundary_conditions(row, load, constraint)
     return System(row, force, displacement, np.flatnonzero(free))
 
 
@@ -160,37 +149,37 @@ def rival(search: Callable[..., Stop]) -> Callable[..., Solution]:
 def solution_at(control: Control, system: System, stop: Stop) -> Solution:
     """Solution at the end of a solve."""
     row, z, u = system.row, system.row.cosine.size, stop.u
-    state, figures = space(z), np.zeros((z, FIGURES))
-    state.counts[STEPS] = stop.steps
+    state, figures = newton.space(z), np.zeros((z, FIGURES))
+    state.counts[newton.STEPS] = stop.steps
     state.q[:], state.balls[:, :2] = system.displacement, u[: 2 * z].reshape(z, 2)
     state.q[system.free] = u[2 * z :]
     # Without a further solve, the choice of free components does not matter.
-    _finish(Task(control, row, system.load, np.ones_like(system.load)), state, figures)
+    _finish(newton.Task(control, row, system.load, np.ones_like(system.load)), state, figures)
     return solution_of(row, state, figures, stop.status, stop.residual, stop.searches)
 
 
 @entry
 def _within(task: Any, limit: int, state: Any) -> bool:
     """``newton.find`` in at most ``limit`` steps; returns whether they were enough."""
-    start_afresh(task, state)
+    newton.start_afresh(task, state)
     q, balls = state.q.copy(), state.balls.copy()
-    enough = rough_residual(task) if has_race_control(task.control) else 0.0
-    arrived = march(task, 0.0, enough, min(limit, CONVEX_MARCH), state)
-    if not arrived and limit > state.counts[STEPS]:
-        go_to(q, balls, state.q, state.balls)
-        arrived = descend(task, 0.0, True, limit - state.counts[STEPS], state)
+    enough = newton.rough_residual(task) if has_race_control(task.control) else 0.0
+    arrived = newton.march(task, 0.0, enough, min(limit, newton.CONVEX_MARCH), state)
+    if not arrived and limit > state.counts[newton.STEPS]:
+        newton.go_to(q, balls, state.q, state.balls)
+        arrived = newton.descend(task, 0.0, True, limit - state.counts[newton.STEPS], state)
     if not arrived or not has_race_control(task.control):
         return arrived
-    return march(task, 1.0, 0.0, limit - state.counts[STEPS], state)
+    return newton.march(task, 1.0, 0.0, limit - state.counts[newton.STEPS], state)
 
 
 @rival
 def convex_with_limit(control: Control, system: System, start: None, limit: int = 1000) -> Stop:
     """The convex solver in at most ``limit`` steps, without continuation; it ignores a ``start``."""
-    state, free = space(system.row.cosine.size), np.zeros(RING)
+    state, free = newton.space(system.row.cosine.size), np.zeros(RING)
     state.q[:], free[system.free] = system.displacement, 1.0
-    arrived = _within(Task(control, system.row, system.load, free), limit, state)
+    arrived = _within(newton.Task(control, system.row, system.load, free), limit, state)
     u = unknowns(system, state.q, state.balls)
     worst, _ = evaluate(control, system, u, np.zeros(system.size), np.zeros((system.size, system.size)))
     status = OK if arrived else f"not converged in {limit} steps"
-    return Stop(u, status, int(state.counts[STEPS]), worst)
+    return Stop(u, status, int(state.counts[newton.STEPS]), worst)

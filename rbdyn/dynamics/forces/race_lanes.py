@@ -15,13 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbdyn.compiled.kernel import VECTOR, alike, either, kernel, law
-from rbdyn.contact.hertz_line import (
-    LineContact,
-    LogarithmicLineContact,
-    PowerLineContact,
-    SlicedLineContact,
-    TiltedLineContact,
-)
+from rbdyn.contact import hertz_line
 from rbdyn.contact.rolling_resistance import LayerFilm, OpenFilm, film_forces, film_reach
 from rbdyn.contact.tangential import (
     RigidContact,
@@ -41,19 +35,7 @@ from rbdyn.contact.traction import (
     table_place,
     without_table,
 )
-from rbdyn.dynamics.forces.races import (
-    EqualRollers,
-    Race,
-    RaceApproach,
-    RaceWrench,
-    RoundRace,
-    UnequalRollers,
-    WavyRace,
-    form_at,
-    race_approach,
-    race_wrench,
-    roller_radius,
-)
+from rbdyn.dynamics.forces import races
 from rbdyn.dynamics.forces.state import ROLLER_STATES
 
 # Blocks hold LANES contacts, VECTOR of them at a time; each quantity is a row of a block. Packed rollers bring their
@@ -117,12 +99,12 @@ def lane_radius(sizes, packed, lane):
     """Radius of the roller in a lane of ``packed`` [m]."""
 
 
-@lane_radius.body(EqualRollers)
+@lane_radius.body(races.EqualRollers)
 def _(sizes, packed, lane):
     return sizes.radius
 
 
-@lane_radius.body(UnequalRollers)
+@lane_radius.body(races.UnequalRollers)
 def _(sizes, packed, lane):
     return packed[RADII + lane]
 
@@ -133,7 +115,13 @@ def in_vectors(parameters):
 
 
 @in_vectors.body(
-    LineContact, PowerLineContact, LogarithmicLineContact, RoundRace, *TABLELESS, SurfaceAxes, TractionSurface
+    hertz_line.LineContact,
+    hertz_line.PowerLineContact,
+    hertz_line.LogarithmicLineContact,
+    races.RoundRace,
+    *TABLELESS,
+    SurfaceAxes,
+    TractionSurface,
 )
 def _(parameters):
     return True
@@ -145,7 +133,7 @@ def _(parameters):
 
 
 # Loops within keep a contact to itself.
-@in_vectors.body(SlicedLineContact, TiltedLineContact, WavyRace)
+@in_vectors.body(hertz_line.SlicedLineContact, hertz_line.TiltedLineContact, races.WavyRace)
 def _(parameters):
     return False
 
@@ -159,7 +147,7 @@ def runs_in_vectors(race):
 @kernel
 def lane_race(race):
     """A race as lanes read it, numbers alone: references to arrays would be counted in every lane."""
-    return Race(
+    return races.Race(
         race.radius,
         race.reach,
         race.form,
@@ -206,7 +194,7 @@ def keep_lane(tangential, lanes, i, wrench):
 @kernel
 def approach_in_lane(race, side, radius, ring, source, j, stride):
     """``race_approach`` of the roller whose x, y, vx, vy and spin stand at ``source[j + row * stride]``."""
-    return race_approach(
+    return races.race_approach(
         race,
         side,
         radius,
@@ -265,7 +253,7 @@ def _(traction_model, slip, load, met, i):
 @kernel
 def approach_of_lane(met, i):
     """The ``RaceApproach`` in lane ``i``."""
-    return RaceApproach(
+    return races.RaceApproach(
         met[NX + i],
         met[NY + i],
         met[INVERSE + i],
@@ -336,7 +324,7 @@ def outer_approaches(race, sizes, ring, y, first, rollers, met, count):
     for i in range(lanes_to_fill(race, count)):
         j = first + i
         coefficient = coefficient_of(bare.tangential, y, j)
-        keep_approach(bare, 1.0, roller_radius(sizes, j), ring, y, j, rollers, coefficient, met, i)
+        keep_approach(bare, 1.0, races.roller_radius(sizes, j), ring, y, j, rollers, coefficient, met, i)
 
 
 @kernel
@@ -364,7 +352,7 @@ def wrenches(outer, inner, met, lanes, outer_count, count):
         race, approach = either(side > 0.0, bare_outer, bare_inner), approach_of_lane(met, i)
         value, slope = from_table(race.traction, met, i)
         steady = steady_by_table(race.tangential, race.traction, approach.slip, approach.load, value, slope)
-        keep_lane(race.tangential, lanes, i, race_wrench(race, side, approach, steady, met[COEFFICIENT + i]))
+        keep_lane(race.tangential, lanes, i, races.race_wrench(race, side, approach, steady, met[COEFFICIENT + i]))
 
 
 @kernel
@@ -372,7 +360,7 @@ def pack(race, sizes, rollers, y, j, side, scratch, lane):
     """Copy the state of roller ``j`` at a race to a lane."""
     for row in range(ROLLER_STATES):
         scratch.packed[row * LANES + lane] = y[row * rollers + j]
-    scratch.packed[RADII + lane] = roller_radius(sizes, j)
+    scratch.packed[RADII + lane] = races.roller_radius(sizes, j)
     scratch.packed[SIDES + lane] = side
     scratch.packed[COEFFICIENTS + lane] = coefficient_of(race.tangential, y, j)
 
@@ -469,7 +457,7 @@ def open_contact(film, race, radius, ring, dx, dy, dvx, dvy, roller_spin):
     distance = math.sqrt(dx * dx + dy * dy)
     inverse = 1.0 / distance
     nx, ny = dx * inverse, dy * inverse
-    rise, _ = form_at(race.form, nx, ny, ring.cos, ring.sin)
+    rise, _ = races.form_at(race.form, nx, ny, ring.cos, ring.sin)
     overlap = race.radius + rise + radius - distance
     tangential = dvy * nx - dvx * ny
     orbit_rate = tangential * inverse
@@ -478,7 +466,7 @@ def open_contact(film, race, radius, ring, dx, dy, dvx, dvy, roller_spin):
     entrainment = 0.5 * ((ring.speed - orbit_rate) * ring_lever - (roller_spin - orbit_rate) * radius)
     rolling, shear = film_forces(film, overlap, entrainment, slip)
     along = shear + rolling * (ring_lever - radius) * inverse
-    return RaceWrench(
+    return races.RaceWrench(
         -along * ny,
         along * nx,
         -radius * (shear - rolling),
@@ -514,7 +502,7 @@ def _(film, on_ring, race, sizes, ring, rollers, y, row, dy, scratch):
         count = 0
         while j < rollers and count < LANES:
             # As far below the mean radius of race and roller as ``reach`` is above it.
-            near = (2.0 * (race.radius + roller_radius(sizes, j)) - race.reach) * (1.0 - ROUND_OFF)
+            near = (2.0 * (race.radius + races.roller_radius(sizes, j)) - race.reach) * (1.0 - ROUND_OFF)
             dx, dy_ = y[j] - ring.x, y[rollers + j] - ring.y
             if near * near < dx * dx + dy_ * dy_ < far * far:
                 pack(race, sizes, rollers, y, j, -1.0, scratch, count)

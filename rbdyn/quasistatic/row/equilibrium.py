@@ -7,18 +7,8 @@ import numpy as np
 
 from rbdyn.base.arrays import Array
 from rbdyn.compiled.kernel import entry, routine
+from rbdyn.quasistatic.row import newton
 from rbdyn.quasistatic.row.ball import Control, ball_forces, spring
-from rbdyn.quasistatic.row.newton import (
-    CONVERGED,
-    NOT_CONVEX_MINIMUM,
-    STEPS,
-    STRIDES,
-    Space,
-    Task,
-    boundary_conditions,
-    find,
-    space,
-)
 from rbdyn.quasistatic.row.ring import (
     INNER_DEPTH,
     LOADED,
@@ -36,7 +26,7 @@ INNER_LOAD, OUTER_LOAD, INNER_ANGLE, OUTER_ANGLE, PULL, MOMENT, FIGURES = range(
 OK = "ok"
 # A figure below this share of the largest of its kind is rounding and set to zero, as symmetry often demands.
 RESOLUTION = 1e-12
-SENTENCES = {NOT_CONVEX_MINIMUM: "no equilibrium was found even with one common cage speed"}
+SENTENCES = {newton.NOT_CONVEX_MINIMUM: "no equilibrium was found even with one common cage speed"}
 LOST = (
     "no equilibrium was found with this raceway control, only with one common cage speed: the control or friction leaves the "
     "balls none, or several; raise model.light_load_share or set model.raceway_control = 'common_cage'"
@@ -130,7 +120,7 @@ def fill_figures(task: Any, state: Any, figures: Any) -> None:
 def solve_row(task: Any, warm: bool, state: Any, figures: Any) -> tuple[int, float]:
     """``newton.find`` the equilibrium and fill ``figures`` (Z, FIGURES). Returns the outcome and the residual [N]."""
     state.counts[:] = 0
-    outcome = find(task, warm, state)
+    outcome = newton.find(task, warm, state)
     _, worst = unbalance(task, state)
     fill_figures(task, state, figures)
     return outcome, worst
@@ -145,18 +135,18 @@ def solve(
     ignored. ``start``: a solution nearby. Nothing is raised where there is no equilibrium: see ``status``.
     """
     size = row.cosine.size
-    force, free, displacement = boundary_conditions(row, load, constraint)
-    state, figures = space(size), np.zeros((size, FIGURES))
+    force, free, displacement = newton.boundary_conditions(row, load, constraint)
+    state, figures = newton.space(size), np.zeros((size, FIGURES))
     state.q[:] = displacement
     if start is not None:
         state.q[:] = np.where(free > 0.0, start.displacement * component_lengths(row.lever), displacement)
         state.balls[:] = np.hstack((start.balls, start.depths))
-    outcome, worst = solve_row(Task(control, row, force, free), start is not None, state, figures)
-    return solution_of(row, state, figures, OK if outcome == CONVERGED else SENTENCES.get(outcome, LOST), worst)
+    outcome, worst = solve_row(newton.Task(control, row, force, free), start is not None, state, figures)
+    return solution_of(row, state, figures, OK if outcome == newton.CONVERGED else SENTENCES.get(outcome, LOST), worst)
 
 
 def solution_of(
-    row: Row, state: Space, figures: Array, status: str, residual: float, searches: int | None = None
+    row: Row, state: newton.Space, figures: Array, status: str, residual: float, searches: int | None = None
 ) -> Solution:
     """Solution in its own units and names, from the state at the end of a solve."""
     unit = component_lengths(row.lever)
@@ -177,7 +167,7 @@ def solution_of(
         stiffness=matrix * np.outer(unit, unit),
         status=status,
         residual=residual,
-        steps=int(state.counts[STEPS]),
-        strides=int(state.counts[STRIDES]),
+        steps=int(state.counts[newton.STEPS]),
+        strides=int(state.counts[newton.STRIDES]),
         searches=searches,
     )

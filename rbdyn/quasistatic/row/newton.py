@@ -18,28 +18,8 @@ import numpy as np
 
 from rbdyn.base.arrays import Array, Whole
 from rbdyn.compiled.kernel import entry, kernel, routine
+from rbdyn.quasistatic.row import ring
 from rbdyn.quasistatic.row.ball import Control, has_race_control, spring
-from rbdyn.quasistatic.row.ring import (
-    BALL,
-    BALL_WORK,
-    ENERGY,
-    INNER_DEPTH,
-    LARGEST,
-    LOADED,
-    OUTER_DEPTH,
-    RING,
-    SUMS,
-    Row,
-    assemble,
-    ball_step,
-    centre_shift,
-    component_lengths,
-    follow,
-    groove_centre,
-    measure,
-    settle,
-    unbalance,
-)
 
 # Counters: Newton steps, continuations, cold starts.
 STEPS, STRIDES, COLD_STARTS, COUNTERS = range(4)
@@ -53,7 +33,7 @@ class Task(NamedTuple):
     """
 
     control: Control
-    row: Row
+    row: ring.Row
     load: Array
     free: Array
 
@@ -84,18 +64,18 @@ class Space(NamedTuple):
 
 def space(balls: int) -> Space:
     """Work space for a row of ``balls`` balls."""
-    ball, work, square = (balls, BALL), (balls, BALL_WORK), (RING, RING)
-    shapes = (RING, ball, square, RING, square, RING, SUMS, work, RING, ball, work, RING)
+    ball, work, square = (balls, ring.BALL), (balls, ring.BALL_WORK), (ring.RING, ring.RING)
+    shapes = (ring.RING, ball, square, ring.RING, square, ring.RING, ring.SUMS, work, ring.RING, ball, work, ring.RING)
     return Space(np.zeros(COUNTERS, np.int64), *(np.zeros(shape) for shape in shapes))
 
 
-def boundary_conditions(row: Row, load: Array, constraint: Array | None) -> tuple[Array, Array, Array]:
+def boundary_conditions(row: ring.Row, load: Array, constraint: Array | None) -> tuple[Array, Array, Array]:
     """``load`` and ``free`` of a ``Task``, and the prescribed displacements (5,) in m, 0 where the load rules.
 
     ``load`` and ``constraint`` are those of ``equilibrium.solve``.
     """
-    unit = component_lengths(row.lever)
-    displacement = np.full(RING, np.nan) if constraint is None else np.asarray(constraint, float)
+    unit = ring.component_lengths(row.lever)
+    displacement = np.full(ring.RING, np.nan) if constraint is None else np.asarray(constraint, float)
     free = np.isnan(displacement)
     return np.asarray(load, float) / unit, free.astype(float), np.where(free, 0.0, displacement) * unit
 
@@ -147,11 +127,11 @@ def force_along(row: Any, both: float, q: Any, direction: Any) -> float:
     """Force along ``direction`` of balls without centrifugal force: two Hertz springs in series, K = ``both``."""
     total = 0.0
     for j in range(row.cosine.size):
-        a_axial, a_radial = groove_centre(row, q, j)
+        a_axial, a_radial = ring.groove_centre(row, q, j)
         length = math.sqrt(a_axial * a_axial + a_radial * a_radial)
         deflection = max(length - row.inner_reach[j] - row.outer_reach[j], 0.0)
         load = both * deflection * math.sqrt(deflection) / length
-        axial, radial = centre_shift(row, j, direction)
+        axial, radial = ring.centre_shift(row, j, direction)
         total += load * (a_axial * axial + a_radial * radial)
     return total
 
@@ -160,7 +140,7 @@ def force_along(row: Any, both: float, q: Any, direction: Any) -> float:
 def force_at(row: Any, both: float, far: float, state: Any) -> float:
     """Move the ring to ``state.base`` + ``far`` times ``state.step``, and return ``force_along`` that step there."""
     q, base, step = state.q, state.base, state.step
-    for i in range(RING):
+    for i in range(ring.RING):
         q[i] = base[i] + far * step[i]
     return force_along(row, both, q, step)
 
@@ -170,14 +150,14 @@ def move_along_load(task: Any, state: Any) -> None:
     """Move ``state.q`` along the free part of the load until the balls roughly carry it."""
     row, direction = task.row, state.step
     length = 0.0
-    for i in range(RING):
+    for i in range(ring.RING):
         direction[i] = task.load[i] * task.free[i]
         state.base[i] = state.q[i]
         length += direction[i] * direction[i]
     if length == 0.0:
         return
     force = math.sqrt(length)
-    for i in range(RING):
+    for i in range(ring.RING):
         direction[i] /= force
     both = (row.inner_stiffness ** (-2.0 / 3.0) + row.outer_stiffness ** (-2.0 / 3.0)) ** -1.5
     below, above = 0.0, FIRST_STEP
@@ -191,7 +171,7 @@ def move_along_load(task: Any, state: Any) -> None:
             below = middle
         if above - below < 0.02 * above:
             break
-    for i in range(RING):
+    for i in range(ring.RING):
         state.q[i] = state.base[i] + above * direction[i]
 
 
@@ -199,11 +179,11 @@ def move_along_load(task: Any, state: Any) -> None:
 def settle_all(row: Any, state: Any) -> None:
     """Settle every ball for the ring at ``state.q``, and mark all as loaded."""
     q, balls = state.q, state.balls
-    state.work[:, LOADED] = 1.0
+    state.work[:, ring.LOADED] = 1.0
     for j in range(row.cosine.size):
-        a_axial, a_radial = groove_centre(row, q, j)
-        settle(row, j, a_axial, a_radial, START_BALANCE, balls)
-        measure(row, j, a_axial, a_radial, balls)
+        a_axial, a_radial = ring.groove_centre(row, q, j)
+        ring.settle(row, j, a_axial, a_radial, START_BALANCE, balls)
+        ring.measure(row, j, a_axial, a_radial, balls)
 
 
 # Outcomes of ``find``.
@@ -228,10 +208,10 @@ def ring_step(free: Any, damping: float, state: Any) -> bool:
     Returns whether every pivot was large enough; only then ``state.step`` is valid.
     """
     count, largest, matrix, vector, table, step = 0, 0.0, state.matrix, state.vector, state.table, state.step
-    for i in range(RING):
+    for i in range(ring.RING):
         if free[i] > 0.0:
             column = 0
-            for k in range(RING):
+            for k in range(ring.RING):
                 if free[k] > 0.0:
                     table[count, column] = matrix[i, k]
                     column += 1
@@ -241,7 +221,7 @@ def ring_step(free: Any, damping: float, state: Any) -> bool:
             count += 1
     if not eliminate(table, step, count, LEAST_PIVOT * largest):
         return False
-    for i in range(RING - 1, -1, -1):
+    for i in range(ring.RING - 1, -1, -1):
         if free[i] > 0.0:
             count -= 1
             step[i] = step[count]
@@ -253,8 +233,8 @@ def ring_step(free: Any, damping: float, state: Any) -> bool:
 @kernel
 def assembly_unbalance(task: Any, strength: float, mixed: bool, state: Any) -> tuple[float, float]:
     """``unbalance`` of a new assembly."""
-    assemble(task, strength, mixed, state)
-    return unbalance(task, state)
+    ring.assemble(task, strength, mixed, state)
+    return ring.unbalance(task, state)
 
 
 @kernel
@@ -271,30 +251,30 @@ def descend(task: Any, strength: float, convex: bool, limit: int, state: Any) ->
     """
     sums = state.sums
     total, worst = assembly_unbalance(task, strength, False, state)
-    unit = stiffness_scale(task.row, sums[LARGEST])
+    unit = stiffness_scale(task.row, sums[ring.LARGEST])
     damping = 0.0
     for _ in range(limit):
         if not math.isfinite(total):
             return False
-        if worst <= AIM * sums[LARGEST]:
+        if worst <= AIM * sums[ring.LARGEST]:
             return True
         if not ring_step(task.free, damping, state):
             damping = max(1e3 * damping, 1e-9 * unit)
             if damping > 1e9 * unit:
-                return worst <= ACCEPTED * sums[LARGEST]
+                return worst <= ACCEPTED * sums[ring.LARGEST]
             continue
         state.counts[STEPS] += 1
         go_to(state.q, state.balls, state.old_q, state.old_balls)
         copy(state.work, state.old_work)
-        before, energy, scale = total, sums[ENERGY], 1.0
+        before, energy, scale = total, sums[ring.ENERGY], 1.0
         shortest = SHORTEST_CONVEX if convex else SHORTEST_FULL
         better = False
         while scale >= shortest:
-            follow(task.row, scale, state.old_work, state)
+            ring.follow(task.row, scale, state.old_work, state)
             total, worst = assembly_unbalance(task, strength, False, state)
             better = total <= (1.0 - 1e-4 * scale) * before
             if convex and not better:
-                better = sums[ENERGY] < energy - 1e-14 * abs(energy)
+                better = sums[ring.ENERGY] < energy - 1e-14 * abs(energy)
             if better:
                 break
             scale *= 0.5 if scale > 0.1 else 0.25
@@ -305,12 +285,12 @@ def descend(task: Any, strength: float, convex: bool, limit: int, state: Any) ->
         # No step improves: the residual is at rounding level, or the matrix is misleading.
         go_to(state.old_q, state.old_balls, state.q, state.balls)
         total, worst = assembly_unbalance(task, strength, False, state)
-        if worst <= ACCEPTED * sums[LARGEST]:
+        if worst <= ACCEPTED * sums[ring.LARGEST]:
             return True
         if not convex or damping > 1e3 * unit:
             return False
         damping = max(1e2 * damping, 1e-6 * unit)
-    return worst <= ACCEPTED * sums[LARGEST]
+    return worst <= ACCEPTED * sums[ring.LARGEST]
 
 
 @routine
@@ -318,8 +298,8 @@ def bound(row: Any, state: Any, furthest: float) -> float:
     """Share of a Newton step that turns no contact line by more than ``furthest`` [rad]."""
     scale, step, work = 1.0, state.step, state.work
     for j in range(row.cosine.size):
-        if work[j, LOADED] > 0.0:
-            axial, radial, x, y = ball_step(row, j, step, work)
+        if work[j, ring.LOADED] > 0.0:
+            axial, radial, x, y = ring.ball_step(row, j, step, work)
             u, v = axial - x, radial - y
             moved = max(
                 (x * x + y * y) / (row.outer_reach[j] * row.outer_reach[j]),
@@ -334,7 +314,7 @@ def bound(row: Any, state: Any, furthest: float) -> float:
 def rough_residual(task: Any) -> float:
     """Residual [N] at which the convex problem may stop when the full equations follow."""
     enough = 0.0
-    for i in range(RING):
+    for i in range(ring.RING):
         enough = max(enough, ROUGHLY * abs(task.load[i]) * task.free[i])
     return enough
 
@@ -353,24 +333,26 @@ def march(task: Any, strength: float, enough: float, limit: int, state: Any) -> 
     for _ in range(limit):
         if not math.isfinite(total):
             return False
-        if worst <= max(AIM * sums[LARGEST], enough):
+        if worst <= max(AIM * sums[ring.LARGEST], enough):
             return True
-        if not ring_step(free, 0.0, state) and not ring_step(free, 1e-9 * stiffness_scale(row, sums[LARGEST]), state):
+        if not ring_step(free, 0.0, state) and not ring_step(
+            free, 1e-9 * stiffness_scale(row, sums[ring.LARGEST]), state
+        ):
             return False
         state.counts[STEPS] += 1
-        floor = worst <= ACCEPTED * sums[LARGEST]
+        floor = worst <= ACCEPTED * sums[ring.LARGEST]
         go_to(state.q, state.balls, state.old_q, state.old_balls)
-        follow(row, bound(row, state, FURTHEST), state.work, state)
+        ring.follow(row, bound(row, state, FURTHEST), state.work, state)
         total, worst = assembly_unbalance(task, strength, True, state)
         if total < 0.25 * best:
             best, idle = total, 0
         else:
             idle += 1
-            if floor and worst <= ACCEPTED * sums[LARGEST]:
+            if floor and worst <= ACCEPTED * sums[ring.LARGEST]:
                 return True
             if idle > PATIENCE:
                 return False
-    return worst <= ACCEPTED * sums[LARGEST]
+    return worst <= ACCEPTED * sums[ring.LARGEST]
 
 
 @routine
@@ -384,7 +366,7 @@ def copy(table: Any, into: Any) -> None:
 @routine
 def go_to(q: Any, balls: Any, to_q: Any, to_balls: Any) -> None:
     """Copy the ring's displacement ``q`` to ``to_q`` and the ``balls`` to ``to_balls``."""
-    for i in range(RING):
+    for i in range(ring.RING):
         to_q[i] = q[i]
     copy(balls, to_balls)
 
@@ -418,7 +400,7 @@ def bring_in(task: Any, state: Any) -> bool:
 def start_afresh(task: Any, state: Any) -> None:
     """Put ring and balls at the first guess of a cold start; prescribed displacements stay."""
     state.counts[COLD_STARTS] += 1
-    for i in range(RING):
+    for i in range(ring.RING):
         if task.free[i] > 0.0:
             state.q[i] = 0.0
     move_along_load(task, state)
@@ -432,7 +414,7 @@ def find(task: Any, warm: bool, state: Any) -> int:
     ``state`` holds the prescribed displacements and, where ``warm``, the start.
     """
     if warm:
-        state.work[:, LOADED] = 1.0
+        state.work[:, ring.LOADED] = 1.0
         if march(task, 1.0, 0.0, FULL_STEPS, state):
             return CONVERGED
     start_afresh(task, state)
@@ -483,14 +465,14 @@ def walk(task: Any, changes: Any, state: Any, path: Any, figures: Any) -> tuple[
         newton_steps += state.counts[STEPS]
         if outcome != CONVERGED:
             return step, newton_steps
-        for i in range(RING):
+        for i in range(ring.RING):
             path[step, i] = state.q[i]
         largest = row.centrifugal_force
         for j in range(size):
-            inner, _ = spring(state.balls[j, INNER_DEPTH], row.inner_stiffness)
-            outer, _ = spring(state.balls[j, OUTER_DEPTH], row.outer_stiffness)
-            if state.work[j, LOADED] > 0.0:
+            inner, _ = spring(state.balls[j, ring.INNER_DEPTH], row.inner_stiffness)
+            outer, _ = spring(state.balls[j, ring.OUTER_DEPTH], row.outer_stiffness)
+            if state.work[j, ring.LOADED] > 0.0:
                 largest = max(largest, inner, outer)
         figures[step, LARGEST_LOAD] = largest
-        _, figures[step, RESIDUAL] = unbalance(task, state)
+        _, figures[step, RESIDUAL] = ring.unbalance(task, state)
     return steps, newton_steps
