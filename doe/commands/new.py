@@ -17,6 +17,7 @@ from rbdyn.base.command import (
     Json,
     OutFile,
     check_out,
+    fill_template,
     flag,
     guarded,
     hand_out,
@@ -56,6 +57,8 @@ HINT = """# Add to a factor: tolerance = 0.005, the half width that can be manuf
 LIMIT = re.compile(r"\s*([^<>=\s]+)\s*(<=|>=|=)\s*([^<>=]+?)\s*")
 CAGE_CLASS = "cage.verdict"
 WHIRL, IMPACT_POWER = "whirl_deviation_ratio", "pocket_impact_power_W"
+# Tolerance of design runs with elastic contacts: 13 to 22 % fewer right-hand sides than the default, and no bias that shows.
+DESIGN_RTOL = 0.04
 # What the run for the class of the cage has besides the settings of the study's runs; its replicates are as few as name a class.
 CAGE_RUN = ("numerics.discard_turns=10", "numerics.extend=false")
 HELD = """# Cage: held in a short run of the scene, so its whirl ratio means little and the impact power is a goal instead.
@@ -121,7 +124,6 @@ def new(
         from doe.workflow.problem import Problem
         from doe.workflow.region import region_that_runs
         from doe.workflow.whole import check_study
-        from rbdyn.base.command import fill_template
         from rbdyn.base.faults import read_toml, validated
         from rbdyn.scene import DrawnScene, rollers_only
 
@@ -133,12 +135,13 @@ def new(
         factors = _factors(read_toml(path))
         # A study finds its scene from its own folder.
         base = path if out is None else Path(os.path.relpath(path.resolve(), out.resolve().parent))
+        values = {"quoted": json.dumps(str(base)), "hours": "true" if hours else None} | _tolerance(scene)
 
         def written(factors: list[Factor]) -> tuple[str, Problem]:
             text = _template()
             for name, section in {**_sections(scene, factors, tolerances, chains), **sections}.items():
                 text = text.replace(f"{{{name}}}", section)
-            text = fill_template(text, {"quoted": json.dumps(str(base)), "hours": "true" if hours else None})
+            text = fill_template(text, values)
             file = validated(StudyFile, tomllib.loads(text), f"study of {path}")
             return text, Problem(out or Path("study.toml"), file)
 
@@ -155,6 +158,13 @@ def new(
                 text, study = written(factors)
         check_study(study)
         hand_out(text, as_json, out, force, "doe study", reads)
+
+
+def _tolerance(scene: "Scene") -> dict[str, str | None]:
+    """What the template says of tolerances: a looser one of design runs, unless the scene has its own or may run implicitly."""
+    if not scene.traction.elasticity or "rtol" in scene.numerics.model_fields_set:
+        return {"looser": "", "rtol": None}
+    return {"looser": f', "numerics.rtol={DESIGN_RTOL}"', "rtol": str(scene.numerics.rtol)}
 
 
 def baseline_cages(study: "Problem", folder: Path, effort: "Effort") -> "dict[str, CageVerdict]":

@@ -63,6 +63,26 @@ def test_command_line_limits(scene):
     assert without == {key: value for key, value in plain.items() if key != "response"}
 
 
+def test_command_line_design_runs_have_a_looser_tolerance(scene, tmp_path):
+    """Command line: than the confirmations, which keep the default; a stated tolerance, and rigid contacts, keep theirs everywhere."""
+    text, study = written(scene)
+    assert study["scene"]["set"][-1] == "numerics.rtol=0.04" and study["confirmation"]["set"] == ["numerics.rtol=0.01"]
+    path = tmp_path / "study.toml"
+    path.write_text(text, encoding="utf-8")
+    loaded = Problem.load(path)
+    design, confirmed = loaded.usual_run, loaded.confirmation_run(loaded.baseline)
+    assert (design.numerics.rtol, confirmed.numerics.rtol) == (0.04, 0.01)
+    own = scene.read_text(encoding="utf-8")
+    for old, new in (
+        ("[operation]", "[numerics]\nrtol = 0.002\n\n[operation]"),
+        ("elasticity = true", "elasticity = false"),
+    ):
+        assert own.count(old) == 1
+        scene.write_text(own.replace(old, new), encoding="utf-8")
+        _, study = written(scene)
+        assert study["scene"]["set"][-1] == "numerics.companion=false" and "set" not in study["confirmation"]
+
+
 def test_command_line_limits_that_are_refused(scene):
     """Command line: a name, a number, a sign or a pair that cannot be is one sentence each, all at once; exit 2."""
     limits = {
