@@ -207,7 +207,7 @@ def test_command_line_from_a_drawing_to_parts(scene, tmp_path):
     )
     path = tmp_path / "study.toml"
     quick = ", ".join(f'"{assignment}"' for assignment in QUICK)
-    lines = [f"set = [{quick}]" if line.startswith("set = ") else line for line in text.splitlines()]
+    lines = [f"set = [{quick}]" if line.startswith('set = ["numerics.turns') else line for line in text.splitlines()]
     path.write_text("\n".join(lines).replace("replicates = 16 ", "replicates = 2 "), encoding="utf-8")
     ran = doe("study", path, "--out", tmp_path / "study", "--json")
     assert ran.returncode == 0, ran.stderr
