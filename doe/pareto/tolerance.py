@@ -141,13 +141,13 @@ class Parts:
         """Share of the parts that keep all limits."""
         return float(self.keep(half).all(axis=1).mean())
 
-    def interval(self, half: Array) -> Interval:
-        """Interval of the share of parts that keep all limits."""
+    def interval(self, half: Array, share: float) -> Interval:
+        """Interval of the share of parts that keep all limits, which is ``share`` on the mean surfaces."""
         if self.count_on_draws is None:
             return interval_of_share(np.array([self.keep(half).all(axis=1).sum()]), len(self.offsets))
         some = self.offsets[:MOST_JUDGED]
         interval = interval_of_share(self.count_on_draws(self.centre + half * some), len(some))
-        return interval.containing(self.share(half))
+        return interval.containing(share)
 
     def most_broken(self, half: Array) -> str:
         """The limit that most parts break."""
@@ -178,7 +178,7 @@ class Parts:
         zero, share = np.zeros_like(self.centre), self.share(np.zeros_like(self.centre))
         sentence = f"No tolerance is possible: {cause}; require less of the gain or a lower probability."
         error = error_of_share(share, len(self.offsets))
-        return WidestTolerances(zero, share, error, self.interval(zero), limit, zero.astype(bool), sentence)
+        return WidestTolerances(zero, share, error, self.interval(zero, share), limit, zero.astype(bool), sentence)
 
     def _within(self, scale: float, ratios: Array) -> WidestTolerances:
         """The tolerances at a scale, and what limits them."""
@@ -190,8 +190,8 @@ class Parts:
         at_rim = half >= self.room * (1.0 - 1e-9)
         # The limit that most parts break just beyond is the limiting one.
         limit = RIM if at_rim.all() else self.most_broken(self.half(ratios, scale * 1.02))
-        share, interval = self.share(half), self.interval(half)
-        error = error_of_share(share, len(self.offsets))
+        share = self.share(half)
+        error, interval = error_of_share(share, len(self.offsets)), self.interval(half, share)
         within = f"Within these tolerances {percent(share)} % ({interval.words}) of the parts {self.promise}; {self.percent} are required."
         rim = "Where a tolerance ends at the bound of the region, no run shows whether it may be wider."
         sentences = [within, f"These tolerances are limited by {limit}.", self.open_errors, rim if at_rim.any() else ""]

@@ -25,9 +25,9 @@ from rbdyn.dynamics.ensemble import Pace, Stop, log
 from rbdyn.dynamics.forces.observe import OBSERVED, observe, slice_loads
 from rbdyn.dynamics.parameters.model import race_contact_law, roller_bearing, rolling_contacts
 from rbdyn.dynamics.parameters.state import layout_of
+from rbdyn.dynamics.part_figures import rated_life
 from rbdyn.dynamics.run import Run
-from rbdyn.life import turning_rings
-from rbdyn.life.rollers import ReferenceLife, reference_life
+from rbdyn.life.rollers import ReferenceLife
 from rbdyn.scene import Scene, rollers_only
 
 if TYPE_CHECKING:
@@ -227,21 +227,13 @@ def rating_life(scene: Scene, azimuth: Array, inner_load: Array, outer_load: Arr
     Loads spread over the slices as at rest. Edge stresses count where the roller has a profile; the ends of a plain cylinder
     would need a half-space solution. A ring that turns bears the mean over all rollers, a ring at rest that of each place.
     """
-    drawing, radius = scene.bearing, 0.5 * scene.bearing.roller_diameter
+    radius = 0.5 * scene.bearing.roller_diameter
     nx, ny = np.cos(azimuth), np.sin(azimuth)
     inner, outer = (
         slice_loads(race_contact_law(scene, race), scene.slices, radius, loads, nx, ny)
         for race, loads in (("inner", inner_load), ("outer", outer_load))
     )
-    return reference_life(
-        inner,
-        outer,
-        capacity=drawing.rated_capacity,
-        gamma=drawing.diameter_ratio,
-        turning=turning_rings(*scene.operation.speeds),
-        angle=np.mod(azimuth, 2.0 * math.pi),
-        edges=drawing.roller_profile != "cylinder",
-    )
+    return rated_life(scene, inner, outer, np.mod(azimuth, 2.0 * math.pi))
 
 
 Race = Literal["outer", "inner"]

@@ -138,12 +138,19 @@ def static_life(scene: Scene) -> ReferenceLife:
         geometry.clearance,
         geometry.centrifugal_force,
     )
+    return rated_life(scene, inner, outer)
+
+
+def rated_life(scene: Scene, inner: Array, outer: Array, angle: Array | None = None) -> ReferenceLife:
+    """`reference_life` of the bearing of a scene under loads on its laminae, at its ratings and speeds."""
+    drawing = scene.bearing
     return reference_life(
         inner,
         outer,
         capacity=drawing.rated_capacity,
         gamma=drawing.diameter_ratio,
         turning=turning_rings(*scene.operation.speeds),
+        angle=angle,
         edges=drawing.roller_profile != "cylinder",
     )
 
