@@ -266,7 +266,7 @@ def heat_fault(result: SimulationResult) -> str | None:
     """Why a result has no steady temperatures, or too high ones; None for a sound one."""
     if result.status == "ok":
         return None
-    return f"{result.status}: {(result.thermal or {}).get('reason') or verdict(result.notes)}"
+    return f"{result.status}: {(result.thermal and result.thermal.reason) or verdict(result.notes)}"
 
 
 def attempt_text(text: str, version: str) -> RunOutcome:

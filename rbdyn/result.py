@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple, Self, Type
 from rbdyn.base.blocks import Column, Sheet, columns_of, within
 from rbdyn.base.files import read_record, write_json
 from rbdyn.base.notes import Note, Notes
-from rbdyn.base.records import Record, derived, nullable, shown, spread, written
+from rbdyn.base.records import Record, derived, keyed, nullable, shown, spread, written
 from rbdyn.base.words import Brief, Figure, counted, error_alone, quantity, value_alone
 from rbdyn.clearances import DIFFERENCE
 from rbdyn.verdict.orbits import CageVerdict
@@ -85,7 +85,7 @@ def arrays_of(figures: Sequence[Any]) -> Any:
 
 def full_status(result: Any) -> str:
     """Status of a result with the reason of its heat balance, where that has no steady state."""
-    reason = (result.thermal or {}).get("reason")
+    reason = result.thermal and result.thermal.reason
     return f"{result.status}: {reason}" if reason and result.status != "ok" else str(result.status)
 
 
@@ -231,6 +231,46 @@ START_FIGURES = {
 BALL_START_FIGURES = {"start_axial_load_N": "axial_load_N", "start_contact_pressure_MPa": "contact_pressure_MPa"}
 
 
+class Ranges(Record):
+    """5 %, 50 % and 95 % of each figure by its name over the inputs that vary, and the share of input sets without a steady state.
+
+    Without a steady state there are none.
+    """
+
+    figures: dict[str, tuple[float, ...]] | None = keyed("ranges")
+    inputs: tuple[str, ...] | None = None
+    unsteady: float | None = keyed("share_without_steady_state", default=None)
+
+    @property
+    def notes(self) -> Notes:
+        """A note where some sets have no steady state."""
+        if self.inputs is None or not self.unsteady:
+            return ()
+        share = f"{100.0 * self.unsteady:.0f} % of the input sets ({', '.join(self.inputs)})"
+        return (Note("undecided", f"temperatures: {share} have no steady state"),)
+
+
+class HeatBalance(Record, kw_only=True):
+    """Heat balance of a roller bearing: its end, and heat, conductances and temperatures by node or way out.
+
+    - ``status``: "steady", or with its ``reason`` "undecided", "no steady state", "seizure" or "too hot"
+    - ``gain`` and ``slopes`` of the loop; ``slopes`` where it is steady
+    - ``path_C``: temperatures of the states visited
+    """
+
+    status: str
+    reason: str | None = None
+    gain: float
+    slopes: list[list[float]] | None = None
+    heat_W: dict[str, float]  # noqa: N815
+    windage_W: float  # noqa: N815
+    carried_off_W: dict[str, float]  # noqa: N815
+    conductances_W_K: dict[str, float]  # noqa: N815
+    ranges: Ranges = spread()
+    oil_fraction: float | None
+    path_C: list[dict[str, float]]  # noqa: N815
+
+
 class LeastClearance(Record):
     """Least diametral clearance of a start [um], and when; ``time_s``: None where it falls to its steady value without a minimum."""
 
@@ -346,9 +386,7 @@ class SimulationResult(Brief, SavedRecord):
     - ``counted_turns``: turns counted of each replicate, more than asked for where it was lengthened
     - ``target``: choice, errors and cost of a run to a target accuracy, None for any other
     - ``temperatures_C``: of "oil", "outer" ring, "inner" ring and "rollers"; None without a heat balance
-    - ``thermal``: the balance: "status" ("steady", "undecided", "no steady state", "seizure" or "too hot") and the "reason" of any but the
-      first, "gain" and "slopes" of the loop, heat by node and by way out [W], conductances [W/K], ranges of the temperatures over the
-      documented inputs of the balance, states visited. ``status`` is "ok" or that of the balance
+    - ``thermal``: the heat balance (``HeatBalance``), None without [thermal]. ``status`` is "ok" or that of the balance
     - ``damage``: figures of wear and impacts by key, None in results of older versions
     - ``pocket_impacts``: impacts of each pocket in turn, by the keys of their figures; None where they are not followed
     - ``verdict``: class of the cage by its orbit, None where the scene leaves it out
@@ -380,7 +418,7 @@ class SimulationResult(Brief, SavedRecord):
     versions: dict[str, str]
     scene: dict[str, Any]
     temperatures_C: dict[str, Quantity] | None = None  # noqa: N815
-    thermal: dict[str, Any] | None = None
+    thermal: HeatBalance | None = None
     part_figures: dict[str, Quantity] | None = None
     damage: dict[str, Quantity] | None = None
     pocket_impacts: dict[str, list[float]] | None = None

@@ -433,7 +433,7 @@ class SimulatedValue(Record):
 class Balance(Record):
     """Heat balance of a point: 5, 50 and 95 % of its temperatures and clearances over its inputs; None without ranges."""
 
-    ranges: dict[str, list[float]] | None
+    ranges: dict[str, tuple[float, ...]] | None
 
 
 class ConfirmedPoint(Record, kw_only=True):
@@ -473,7 +473,7 @@ class ConfirmedPoint(Record, kw_only=True):
             cage=point.cages,
             friction_check=result.friction_check,
             temperatures_C=_temperatures(result),
-            thermal=None if balance is None else Balance(balance.get("ranges")),
+            thermal=None if balance is None else Balance(balance.ranges.figures),
             gains=gains,
             statement=None if gains is None else statement(gains),
         )

@@ -19,6 +19,7 @@ from rbdyn.clearances import other_ranges
 from rbdyn.quasistatic.preload import Scan, over_clearance, over_preload, over_wear
 from rbdyn.quasistatic.result import (
     RACES,
+    BallHeatBalance,
     BallResult,
     DoubleDeckerReport,
     RowReport,
@@ -302,8 +303,7 @@ def equilibrium_blocks(result: BallResult) -> list[Block]:
     """Places, contacts, life and stiffness of each row, forces of the rings, balls, notes; without an equilibrium nothing but the
     temperatures of the search for steady ones."""
     if not result.is_equilibrium:
-        thermal = result.thermal or {}
-        search = [_search_table(thermal)] if "path_heat_W" in thermal else []
+        search = [_search_table(result.thermal)] if isinstance(result.thermal, BallHeatBalance) else []
         return with_notes(status_notes(result.status), [*_start_blocks(result), *search])
     titles = {name: f"{name} row" if name else "" for name in result.row_reports}
     rows: list[Block] = []
@@ -321,7 +321,7 @@ def equilibrium_blocks(result: BallResult) -> list[Block]:
         )
     if result.fits is not None:
         sentences.append(_fits(result.fits))
-    if result.temperatures_C is not None and result.thermal is not None:
+    if result.temperatures_C is not None and isinstance(result.thermal, BallHeatBalance):
         sentences += _temperatures(result.temperatures_C, result.thermal)
     if result.runout is not None:
         sentences.append(_runout(result.runout))
@@ -438,15 +438,15 @@ def _fits(fits: dict[str, Any]) -> str:
 NODE_NAMES = {"oil": "oil", "outer": "outer ring", "inner": "inner ring", "rollers": "balls"}
 
 
-def _temperatures(nodes: dict[str, float], thermal: dict[str, Any]) -> list[str]:
+def _temperatures(nodes: dict[str, float], thermal: BallHeatBalance) -> list[str]:
     """Steady temperatures with their ranges, heat and its ways out, clearance and contact angle in operation."""
-    spans = thermal["ranges"]
+    spans = thermal.ranges.figures or {}
     parts = ", ".join(f"{part} {nodes[node]:.1f} ({range_ends(spans[node])})" for node, part in NODE_NAMES.items())
-    friction = thermal["friction_W"]
-    ways = ", ".join(f"{way} {heat:.4g} W" for way, heat in thermal["carried_off_W"].items() if heat != 0.0)
-    clearance, angle = thermal["clearance_um"], thermal["unloaded_angle_deg"]
+    friction = thermal.friction_W
+    ways = ", ".join(f"{way} {heat:.4g} W" for way, heat in thermal.carried_off_W.items() if heat != 0.0)
+    clearance, angle = thermal.clearance_um, thermal.unloaded_angle_deg
     return [
-        f"temperatures [°C], with 5 to 95 % of the unknown inputs: {parts}; thermal loop gain {thermal['gain']:.2g}",
+        f"temperatures [°C], with 5 to 95 % of the unknown inputs: {parts}; thermal loop gain {thermal.gain:.2g}",
         f"heat by SKF's friction model: {sum(friction.values()):.4g} W, rolling {friction['rolling']:.4g} and sliding "
         f"{friction['sliding']:.4g}; removed by {ways}",
         f"clearance in operation {clearance['operating']:.4g} µm of {clearance['drawn']:.4g} drawn, unloaded contact angle "
@@ -455,10 +455,10 @@ def _temperatures(nodes: dict[str, float], thermal: dict[str, Any]) -> list[str]
     ]
 
 
-def _search_table(thermal: dict[str, Any]) -> Table:
+def _search_table(thermal: BallHeatBalance) -> Table:
     """Temperatures, heat and clearance of the states visited."""
     header = (*(f"{part} [°C]" for part in NODE_NAMES.values()), "heat [W]", "clearance [µm]")
-    states = zip(thermal["path_C"], thermal["path_heat_W"], thermal["path_clearance_um"], strict=True)
+    states = zip(thermal.path_C, thermal.path_heat_W, thermal.path_clearance_um, strict=True)
     rows = [
         [*(f"{state[node]:.1f}" for node in NODE_NAMES), f"{heat:.4g}", f"{clearance:.4g}"]
         for state, heat, clearance in states

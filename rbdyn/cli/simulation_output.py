@@ -203,7 +203,7 @@ def _temperatures(result: SimulationResult) -> list[Block]:
     balance, figures = result.thermal, result.temperatures_C
     if balance is None or figures is None:
         return []
-    ranges = balance.get("ranges") or {}
+    ranges = balance.ranges.figures or {}
     rows = [
         (
             NODE_NAMES[node],
@@ -214,17 +214,17 @@ def _temperatures(result: SimulationResult) -> list[Block]:
             range_ends(ranges[node]) if node in ranges else "",
             "" if figure.statistical_error is None else _error(figure.statistical_error),
             "" if figure.numerical_error is None else _error(figure.numerical_error),
-            f"{balance['heat_W'][node]:.3g}",
+            f"{balance.heat_W[node]:.3g}",
         )
         for node, figure in figures.items()
     ]
     header = ("temperature [°C]", "value", "inputs (90 %)", "statistical (95 %)", "numerical (95 %)", "heat [W]")
-    ways = ", ".join(f"{way} {power:.3g} W" for way, power in balance["carried_off_W"].items() if power)
-    state = "steady state" if balance["status"] == "steady" else balance["status"]
-    inputs = ", ".join(balance.get("inputs", ()))
+    ways = ", ".join(f"{way} {power:.3g} W" for way, power in balance.carried_off_W.items() if power)
+    state = "steady state" if balance.status == "steady" else balance.status
+    inputs = ", ".join(balance.ranges.inputs or ())
     return [
         Table("", header, rows),
-        Paragraph(f"{state}; thermal loop gain {balance['gain']:+.2f}; removed: {ways}"),
+        Paragraph(f"{state}; thermal loop gain {balance.gain:+.2f}; removed: {ways}"),
         *([Paragraph(other_ranges(ranges))] if ranges else []),
         *([Paragraph(f"inputs that vary: {inputs}", detail=Detail.ALL)] if inputs else []),
     ]

@@ -225,7 +225,12 @@ def _parts(
 
     # Points that start from each other: the first one takes the other from short runs.
     result = found[origin] if origin in found else run(short(at[origin].changed({"thermal.start": None})), notice=None)
-    if isinstance(result, str) or (result.thermal or {}).get("status") != "steady" or result.temperatures_C is None:
+    if (
+        isinstance(result, str)
+        or result.thermal is None
+        or result.thermal.status != "steady"
+        or not result.temperatures_C
+    ):
         raise RunError(f"the point starts from {origin!r}, which has no steady temperatures")
     nodes = {node: figure.value for node, figure in result.temperatures_C.items()}
     return [*(nodes[node] for node in NODES), nodes["outer"], nodes["inner"]]

@@ -32,9 +32,9 @@ from rbdyn.dynamics.run import with_numerics
 from rbdyn.dynamics.statistics.error_bars import drifting, slow_change
 from rbdyn.dynamics.statistics.metrics import quantity, work_done
 from rbdyn.dynamics.statistics.replicate import Replicate, Statistic, mean
-from rbdyn.result import Quantity, SimulationResult
+from rbdyn.result import HeatBalance, Quantity, Ranges, SimulationResult
 from rbdyn.scene import Scene
-from rbdyn.scene.input_ranges import Ranges, input_ranges
+from rbdyn.scene.input_ranges import input_ranges
 from rbdyn.scene.notes import heat_notes
 from rbdyn.scene.thermal import Temperatures, Thermal, at_temperatures, inlet_temperature, part_temperatures, too_hot
 from rbdyn.thermal.fixed_point import CLEAR, VAGUE, State, learned, model_of, next_step, steady_state
@@ -399,27 +399,27 @@ def _result(
         figures = figures | {POWER_LOSS: _shifted(figures[POWER_LOSS], heat_to_steady(state, slopes))}
     network = trial.network
     of_nodes = network.terms(powers_of(trial.ensemble.runs)) @ network.term_shares
-    ranges = _ranges(scene, trial.hot, path, slopes) if steady else None
-    record = {
-        "status": status,
-        **({"reason": reason} if reason else {}),
-        "gain": gain(slopes),
-        **({"slopes": slopes.tolist()} if steady else {}),
-        "heat_W": dict(zip(NODES, of_nodes.tolist(), strict=True)),
-        "windage_W": network.windage,
-        "carried_off_W": carried_off(network.conductances, network.boundaries, state.image),
-        "conductances_W_K": network.conductances._asdict(),
-        **({"ranges": None} if ranges is None else ranges.as_dict()),
-        "oil_fraction": trial.hot.lubricant.oil_fraction,
-        "path_C": [dict(zip(NODES, visited.temperatures.tolist(), strict=True)) for visited in path],
-    }
+    ranges = _ranges(scene, trial.hot, path, slopes) if steady else Ranges(None)
+    thermal = HeatBalance(
+        status=status,
+        reason=reason or None,
+        gain=gain(slopes),
+        slopes=slopes.tolist() if steady else None,
+        heat_W=dict(zip(NODES, of_nodes.tolist(), strict=True)),
+        windage_W=network.windage,
+        carried_off_W=carried_off(network.conductances, network.boundaries, state.image),
+        conductances_W_K=network.conductances._asdict(),
+        ranges=ranges,
+        oil_fraction=trial.hot.lubricant.oil_fraction,
+        path_C=[dict(zip(NODES, visited.temperatures.tolist(), strict=True)) for visited in path],
+    )
     return replace(
         result,
         figures=figures,
         status=result.status if status == "steady" else status,
         temperatures_C=temperatures,
         part_figures=at_temperatures_with_errors(scene, result.part_figures or {}, temperatures),
-        thermal=record,
+        thermal=thermal,
         scene=scene.model_dump(mode="json"),
         cost={**result.cost, **work_done(balance.runs), "turns": balance.turns, "states": len(path)},
         notes=(*_notes(scene, trial.hot, status, reason, ranges), *_new(result.notes, scene, trial.hot, status)),
@@ -482,9 +482,9 @@ def _new(notes: Notes, scene: Scene, hot: Scene, status: str) -> list[Note]:
     return [note for note in notes if note not in computed and note.code != status]
 
 
-def _notes(scene: Scene, hot: Scene, status: str, reason: str, ranges: Ranges | None) -> Notes:
+def _notes(scene: Scene, hot: Scene, status: str, reason: str, ranges: Ranges) -> Notes:
     """Notes of the heat balance: its verdict, what its inputs leave open, and where the oil fraction is a guess."""
-    notes = [*status_notes(f"{status}: {reason}"), *(() if ranges is None else ranges.notes)]
+    notes = [*status_notes(f"{status}: {reason}"), *ranges.notes]
     thermal, mounting = scene.thermal, scene.mounting
     assert thermal is not None and mounting is not None
     return (*notes, *heat_notes(thermal, scene.lubricant, mounting, heat.ring_width(scene)), *heat.flow_notes(hot))

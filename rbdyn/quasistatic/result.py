@@ -26,7 +26,7 @@ from rbdyn.properties.materials import equivalent_modulus
 from rbdyn.quasistatic.row.ball import FixedShare, FrictionShare
 from rbdyn.quasistatic.row.equilibrium import INNER_ANGLE, INNER_LOAD, MOMENT, OUTER_ANGLE, OUTER_LOAD, PULL, Solution
 from rbdyn.quasistatic.row.model import RowModel
-from rbdyn.result import SavedRecord, StartResult
+from rbdyn.result import Ranges, SavedRecord, StartResult
 from rbdyn.scene.ball import BallRow, BallScene
 from rbdyn.scene.fits import race_film_temperature
 
@@ -271,6 +271,40 @@ class DoubleDeckerReport(RingPlace):
     outer: RowReport
 
 
+class BallHeatBalance(Record, kw_only=True):
+    """Heat balance of a row of balls: its end, and heat, conductances and temperatures by node or way out.
+
+    - ``status``: "steady", or with its ``reason`` "undecided", "no steady state", "seizure" or "too hot"
+    - ``gain`` of the loop; ``friction_W`` "rolling" and "sliding", and the loads of the friction model
+    - ``clearance_um`` and ``unloaded_angle_deg``: "drawn" and "operating"
+    - ``path_C``, ``path_heat_W`` and ``path_clearance_um`` of the states visited
+    """
+
+    status: str
+    gain: float
+    heat_W: dict[str, float]  # noqa: N815
+    clearance_um: dict[str, float]
+    unloaded_angle_deg: dict[str, float]
+    friction_W: dict[str, float]  # noqa: N815
+    friction_loads_N: dict[str, float]  # noqa: N815
+    carried_off_W: dict[str, float]  # noqa: N815
+    conductances_W_K: dict[str, float]  # noqa: N815
+    ranges: Ranges = spread()
+    path_C: list[dict[str, float]]  # noqa: N815
+    path_heat_W: list[float]  # noqa: N815
+    path_clearance_um: list[float]
+    reason: str | None = None
+
+
+class ColdSeizure(Record):
+    """Heat balance of a bearing that is impossible before any heat, at the temperatures of the cold machine."""
+
+    status: str
+    reason: str
+    gain: None
+    path_C: list[dict[str, float]]  # noqa: N815
+
+
 class BallResult(Brief, SavedRecord, kw_only=True):
     """Equilibrium of a ball bearing.
 
@@ -278,9 +312,7 @@ class BallResult(Brief, SavedRecord, kw_only=True):
     without one. ``ring_growth_um``, ``fits``: where the scene has ring growth or a mounting. ``other_roots``: other
     equilibria of the same load, where the solver searches for them. ``runout``: of the turning ring, where the command
     computed it. ``temperatures_C``: of "oil", "outer" ring, "inner" ring and balls ("rollers"), where the scene has a heat balance.
-    ``start``: of the cold machine, with [thermal.start]. ``thermal``: the balance: its "status" ("steady", "undecided", "no steady state", "seizure" or "too hot") and the "reason" of any but the
-    first, the "gain" of the loop, heat by node, friction and its loads, heat by way out, conductances, ranges of the temperatures
-    over the documented inputs, and the "path_C" of the search. The figures of the report are also attributes, by the keys of the JSON form: ``displacement_mm``, ``life``,
+    ``start``: of the cold machine, with [thermal.start]. ``thermal``: the heat balance. The figures of the report are also attributes, by the keys of the JSON form: ``displacement_mm``, ``life``,
     ``max_stress_MPa``, and ``inner`` and ``outer`` of a double-decker bearing. ``rows``: solutions in SI, one, or those of the inner and outer row of a double-decker bearing; empty for a
     loaded result or without an equilibrium. ``ratings``: data of their pressures and lives.
     """
@@ -300,7 +332,7 @@ class BallResult(Brief, SavedRecord, kw_only=True):
     scene: dict[str, Any]
     runout: dict[str, float] | None = None
     temperatures_C: dict[str, float] | None = None  # noqa: N815
-    thermal: dict[str, Any] | None = None
+    thermal: BallHeatBalance | ColdSeizure | None = None
     start: StartResult | None = None
     rows: tuple[Solution, ...] = outside_json(default=())
     ratings: tuple[Rating, ...] = outside_json(default=())
@@ -354,8 +386,7 @@ class BallResult(Brief, SavedRecord, kw_only=True):
         """All figures by name, units in the names; none without an equilibrium."""
         if self.report is None:
             return {}
-        report, heat = self.report, self.thermal or {}
-        figures: dict[str, float | None] = {}
+        report, figures = self.report, dict[str, float | None]()
         for name, row in self.row_reports.items():
             figures |= {f"{name}_row_{key}" if name else key: value for key, value in row.figures.items()}
         figures |= {f"displacement_{axis}_um": 1e3 * report.displacement_mm[axis] for axis in "xyz"}
@@ -366,9 +397,9 @@ class BallResult(Brief, SavedRecord, kw_only=True):
         figures |= {f"fit_{race}_pressure_MPa": (self.fits or {}).get(f"{race}_pressure_MPa") for race in RACES}
         nodes = {("ball" if node == "rollers" else node): value for node, value in (self.temperatures_C or {}).items()}
         figures |= {f"{node}_temperature_C": value for node, value in nodes.items()}
-        if "clearance_um" in heat:
-            figures["operating_clearance_um"] = heat["clearance_um"]["operating"]
-            figures["friction_W"] = math.fsum(heat["friction_W"].values())
+        if isinstance(self.thermal, BallHeatBalance):
+            figures["operating_clearance_um"] = self.thermal.clearance_um["operating"]
+            figures["friction_W"] = math.fsum(self.thermal.friction_W.values())
         figures |= {} if self.start is None else {name: each.value for name, each in self.start.figures.items()}
         return {name: float(value) for name, value in figures.items() if value is not None}
 

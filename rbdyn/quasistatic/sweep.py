@@ -29,6 +29,7 @@ from rbdyn.base.records import derived, finite, keyed, outside_json, save_table
 from rbdyn.base.words import counted
 from rbdyn.quasistatic.bearing import equilibrium
 from rbdyn.quasistatic.result import (
+    BallHeatBalance,
     DoubleDeckerReport,
     Remark,
     ball_columns,
@@ -361,9 +362,9 @@ def _solve(scene: BallScene, before: tuple[Solution, ...]) -> PointRecord:
     found += [Remark(note.code, note) for note in limits]
     if isinstance(report, DoubleDeckerReport):
         figures["middle_ring_speed_rpm"] = report.middle_ring.speed_rpm
-    if result.temperatures_C is not None and result.thermal is not None:
+    if result.temperatures_C is not None and isinstance(result.thermal, BallHeatBalance):
         figures |= {f"{node}_temperature_C": value for node, value in result.temperatures_C.items()}
-        figures |= {"thermal_gain": result.thermal["gain"], "friction_W": sum(result.thermal["friction_W"].values())}
+        figures |= {"thermal_gain": result.thermal.gain, "friction_W": sum(result.thermal.friction_W.values())}
     figures |= {} if result.start is None else {name: each.value for name, each in result.start.figures.items()}
     figures |= {"residual_N": report.residual_N, "iterations": report.iterations}
     balls = {name: solution.figures for name, solution in zip(rows, result.rows, strict=True)}

@@ -29,12 +29,13 @@ from rbdyn.life import friction
 from rbdyn.life.balls import FASTEST, static_capacity
 from rbdyn.properties.catalogue import diameter_series
 from rbdyn.properties.materials import MATERIALS, equivalent_modulus
-from rbdyn.quasistatic.result import BallResult, Rating, overload, reference_capacities
+from rbdyn.quasistatic.result import BallHeatBalance, BallResult, ColdSeizure, Rating, overload, reference_capacities
 from rbdyn.quasistatic.row.equilibrium import Solution, solve
 from rbdyn.quasistatic.row.model import RowModel, cage_speed, clearance_of, constraint_of, load_of, row_of
+from rbdyn.result import Ranges
 from rbdyn.scene.ball import SingleRowScene
 from rbdyn.scene.fits import race_film_temperature
-from rbdyn.scene.input_ranges import Ranges, input_ranges
+from rbdyn.scene.input_ranges import input_ranges
 from rbdyn.scene.notes import heat_notes
 from rbdyn.scene.operation import raceway_radii
 from rbdyn.scene.thermal import Temperatures, Thermal, inlet_temperature, oil_ceiling, over_ceiling, part_temperatures
@@ -333,14 +334,14 @@ def with_temperatures(
     if status == "steady":
         status, reason = ceiling_verdict(scene, nodes)
     hot = solve(at_temperatures(scene, Temperatures(**nodes)))
-    ranges = ranges_of(scene, last, slopes) if ranged and search.status == "steady" else None
+    ranges = ranges_of(scene, last, slopes) if ranged and search.status == "steady" else Ranges(None)
     steady = status == "steady"
     result = replace(
         hot,
         status=hot.status if steady else f"{status}: {reason}",
         report=hot.report if steady else None,
         temperatures_C=nodes,
-        thermal=_record(scene, search, found, ranges) | {"status": status} | ({} if steady else {"reason": reason}),
+        thermal=_record(scene, search, ranges, status, reason or None),
         notes=(*_notes(scene, found, ranges), *(hot.notes or ())) if hot.is_equilibrium else None,
         rows=hot.rows if steady else (),
         scene=scene.model_dump(mode="json"),
@@ -353,7 +354,7 @@ def _seized_cold(scene: SingleRowScene, reason: str, solve: Callable[[SingleRowS
     assert scene.thermal is not None and scene.lubricant is not None
     nodes = dict.fromkeys(NODES, inlet_temperature(scene.thermal, scene.lubricant))
     cold = solve(at_temperatures(scene, Temperatures(**nodes)))
-    thermal = {"status": "seizure", "reason": reason, "gain": None, "path_C": [nodes]}
+    thermal = ColdSeizure("seizure", reason, None, [nodes])
     input_scene = scene.model_dump(mode="json")
     return replace(cold, status=f"seizure: {reason}", temperatures_C=nodes, thermal=thermal, scene=input_scene)
 
@@ -387,36 +388,31 @@ def ranges_of(scene: SingleRowScene, state: State, slopes: Array) -> Ranges:
     return input_ranges(scene, about, lambda share: term_shares(scene, share), clearances, {}, full=full)
 
 
-def _record(scene: SingleRowScene, search: Search, found: Heat, ranges: Ranges | None) -> dict[str, Any]:
+def _record(scene: SingleRowScene, search: Search, ranges: Ranges, status: str, reason: str | None) -> BallHeatBalance:
+    found: Heat = search.last.run
     inner, outer = found.scene.operation.speeds
     speed = abs(inner - outer)
-    return {
-        "status": "",
-        "gain": gain(search.slopes),
-        "heat_W": dict(zip(NODES, found.heat.tolist(), strict=True)),
-        **_geometry(scene, found),
-        "friction_W": {"rolling": speed * found.moments.rolling, "sliding": speed * found.moments.sliding},
-        "friction_loads_N": found.loads._asdict(),
-        "carried_off_W": carried_off(found.conductances, found.boundaries, search.last.image),
-        "conductances_W_K": found.conductances._asdict(),
-        **({"ranges": None} if ranges is None else ranges.as_dict()),
-        "path_C": [dict(zip(NODES, state.temperatures.tolist(), strict=True)) for state in search.states],
-        "path_heat_W": [float(state.run.heat.sum()) for state in search.states],
-        "path_clearance_um": [1e6 * clearance_of(state.run.model.row)[0] for state in search.states],
-    }
-
-
-def _geometry(scene: SingleRowScene, found: Heat) -> dict[str, Any]:
-    """Diametral clearance and unloaded contact angle, drawn and in operation."""
     drawn = row_of(scene.model_copy(update={"mounting": None, "thermal": None}))
     sizes = {"drawn": clearance_of(drawn.row), "operating": clearance_of(found.model.row)}
-    return {
-        "clearance_um": {name: 1e6 * clearance for name, (clearance, _) in sizes.items()},
-        "unloaded_angle_deg": {name: math.degrees(angle) for name, (_, angle) in sizes.items()},
-    }
+    return BallHeatBalance(
+        status=status,
+        gain=gain(search.slopes),
+        heat_W=dict(zip(NODES, found.heat.tolist(), strict=True)),
+        clearance_um={name: 1e6 * clearance for name, (clearance, _) in sizes.items()},
+        unloaded_angle_deg={name: math.degrees(angle) for name, (_, angle) in sizes.items()},
+        friction_W={"rolling": speed * found.moments.rolling, "sliding": speed * found.moments.sliding},
+        friction_loads_N=found.loads._asdict(),
+        carried_off_W=carried_off(found.conductances, found.boundaries, search.last.image),
+        conductances_W_K=found.conductances._asdict(),
+        ranges=ranges,
+        path_C=[dict(zip(NODES, state.temperatures.tolist(), strict=True)) for state in search.states],
+        path_heat_W=[float(state.run.heat.sum()) for state in search.states],
+        path_clearance_um=[1e6 * clearance_of(state.run.model.row)[0] for state in search.states],
+        reason=reason,
+    )
 
 
-def _notes(scene: SingleRowScene, found: Heat, ranges: Ranges | None) -> Notes:
+def _notes(scene: SingleRowScene, found: Heat, ranges: Ranges) -> Notes:
     """What the heat balance leaves open."""
     kind, (inner, outer), mounting = scene.bearing.kind, scene.operation.speeds, scene.mounting
     thermal, lubricant = scene.thermal, scene.lubricant
@@ -436,7 +432,7 @@ def _notes(scene: SingleRowScene, found: Heat, ranges: Ranges | None) -> Notes:
         )
         notes.append(Note("unverified", sentence))
     notes += starvation_note(found.scene, "temperatures")
-    notes += [] if ranges is None else ranges.notes
+    notes += ranges.notes
     return (*notes, *heat_notes(thermal, lubricant, mounting, mounting.width))
 
 

@@ -13,9 +13,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from rbdyn.base.arrays import Array
-from rbdyn.base.notes import Note, Notes
-from rbdyn.base.records import Record, keyed
 from rbdyn.clearances import DIFFERENCE
+from rbdyn.result import Ranges
 from rbdyn.thermal.losses import HOTTEST, TERMS, HeatModel
 from rbdyn.thermal.network import INNER, NODES, OUTER
 
@@ -39,22 +38,6 @@ OTHER = ("film_share_to_oil", "shaft_lag", "cage_offset_K")
 STARTING = ("housing_widths", "shaft_widths")
 # Input sets, a power of two, their seed, and the quantiles that a range states.
 SETS, SEED, QUANTILES = 256, 1, (0.05, 0.5, 0.95)
-
-
-class Ranges(Record):
-    """5 %, 50 % and 95 % of each figure by its name, the inputs that vary, and the share of input sets without a steady state."""
-
-    figures: dict[str, tuple[float, ...]] = keyed("ranges")
-    inputs: tuple[str, ...]
-    unsteady: float = keyed("share_without_steady_state")
-
-    @property
-    def notes(self) -> Notes:
-        """A note where some sets have no steady state."""
-        if self.unsteady == 0.0:
-            return ()
-        share = f"{100.0 * self.unsteady:.0f} % of the input sets ({', '.join(self.inputs)})"
-        return (Note("undecided", f"temperatures: {share} have no steady state"),)
 
 
 # By key of a scene, the losses (terms,) at a value of it over those at its own.

@@ -461,10 +461,10 @@ def begun_near(scene: "Scene", near: Near | None) -> "Scene":
 
 def near_of(result: "SimulationResult") -> Near | None:
     """The heat balance of a result for that of a similar bearing, to digits that other processors give too; None without slopes."""
-    if result.temperatures_C is None or result.thermal is None or "slopes" not in result.thermal:
+    if result.temperatures_C is None or result.thermal is None or result.thermal.slopes is None:
         return None
     nodes = [round(result.temperatures_C[node].value, 1) for node in Temperatures._fields]
-    slopes = [[round(slope, 2) + 0.0 for slope in row] for row in result.thermal["slopes"]]
+    slopes = [[round(slope, 2) + 0.0 for slope in row] for row in result.thermal.slopes]
     return Near(temperatures_C=nodes, slopes=slopes)
 
 
@@ -475,4 +475,4 @@ def simulated_scene(result: "SimulationResult", source: str = "scene") -> "Scene
     scene = Scene.from_dict(result.scene, source)
     if result.thermal is None:
         return scene
-    return at_temperatures(scene, Temperatures(**result.thermal["path_C"][-1]))
+    return at_temperatures(scene, Temperatures(**result.thermal.path_C[-1]))

@@ -55,14 +55,14 @@ def check_balance(seed: int) -> None:
         return
     assert result.cost["rhs_evaluations"] <= BUDGET, seed
     balance = result.thermal
-    assert balance["status"] in ("steady", "undecided", "no steady state", "seizure", "too hot")
-    assert (balance["status"] == "steady") == (result.status == "ok") and (result.status == "ok" or balance["reason"])
-    assert balance["status"] != "no steady state" or balance["gain"] >= 1.0
+    assert balance.status in ("steady", "undecided", "no steady state", "seizure", "too hot")
+    assert (balance.status == "steady") == (result.status == "ok") and (result.status == "ok" or balance.reason)
+    assert balance.status != "no steady state" or balance.gain >= 1.0
     coldest = min(scene.lubricant.oil_inlet_temperature_C, scene.thermal.ambient_C)
     for node, figure in result.temperatures_C.items():
         assert figure.value >= coldest, (seed, node)
-        if balance["status"] == "steady":
-            assert abs(figure.value - balance["path_C"][-1][node]) <= (figure.error or 0.0) + 0.5
+        if balance.status == "steady":
+            assert abs(figure.value - balance.path_C[-1][node]) <= (figure.error or 0.0) + 0.5
 
 
 @pytest.mark.slow
@@ -91,7 +91,10 @@ def test_maker_s_bearings_in_a_bath(designation, miss, tmp_path):
     path = tmp_path / "bath.toml"
     path.write_text(f"{text}\n[mounting]\n{mounting}inner_interference_um = 10.0\n[thermal]\n", encoding="utf-8")
     result = simulate(Scene.load(path, SHORT), 2, notice=None)
-    nodes, ranges = {node: figure.value for node, figure in result.temperatures_C.items()}, result.thermal["ranges"]
+    nodes, ranges = (
+        {node: figure.value for node, figure in result.temperatures_C.items()},
+        result.thermal.ranges.figures,
+    )
     assert result.status == "ok" and nodes["oil"] < nodes["rollers"]
     assert ranges["outer"][0] < 70.0 + miss and ranges["outer"][2] > 70.0
     assert ranges["inner_minus_outer_K"][0] < 5.0 and ranges["inner_minus_outer_K"][2] > 10.0

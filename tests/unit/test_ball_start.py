@@ -59,8 +59,8 @@ def test_unit_end_of_the_course_is_the_steady_balance(cold):
     for node, column in list(start.path["temperatures_C"].items())[:4]:
         assert column[0] == 20.0 and column[-1] == pytest.approx(cold.temperatures_C[node], abs=0.1)
     figures = start.path["figures"]
-    assert figures["radial_um"][-1] == pytest.approx(steady["clearance_um"]["operating"], abs=0.1)
-    assert figures["axial_load_N"][-1] == pytest.approx(steady["friction_loads_N"]["axial"], rel=5e-3)
+    assert figures["radial_um"][-1] == pytest.approx(steady.clearance_um["operating"], abs=0.1)
+    assert figures["axial_load_N"][-1] == pytest.approx(steady.friction_loads_N["axial"], rel=5e-3)
     assert figures["contact_pressure_MPa"][-1] == pytest.approx(max(cold.max_stress_MPa.values()), rel=5e-3)
     assert 500.0 < start.time_to_steady_s < 600.0 and start.guide_um is start.pocket_um is None
     assert BallResult.from_dict(json.loads(json.dumps(cold.as_dict()))).start == start
@@ -121,7 +121,7 @@ def test_unit_preload_that_runs_away_is_a_seizure_with_moment_and_cause():
     """Unit: in a housing that cannot expand a fixed preload runs away; the status says from when, why, and what ends it."""
     seized = rbdyn.equilibrium(_spindle({}, mounting={"housing_material": RIGID}), ranges=False)
     start = seized.start
-    assert seized.status.startswith("no steady state") and seized.thermal["gain"] >= 1.0 and seized.report is None
+    assert seized.status.startswith("no steady state") and seized.thermal.gain >= 1.0 and seized.report is None
     assert start.status == "seizure" and start.time_to_steady_s is None
     said = re.match(r"the preload runs away: from (\S+) s on the thermal loop gain is above 1", start.reason)
     assert said is not None and 0.0 < float(said[1]) < (end := start.path["time_s"][-1])

@@ -77,11 +77,11 @@ def test_invariant_steady_temperatures(tables):
     scene = scene_of(tables)
     result = rbdyn.equilibrium(scene)
     record = result.thermal
-    assert result.status == "ok" and record["status"] == "steady" and record["gain"] < 1.0
-    heat, friction = sum(record["heat_W"].values()), sum(record["friction_W"].values())
+    assert result.status == "ok" and record.status == "steady" and record.gain < 1.0
+    heat, friction = sum(record.heat_W.values()), sum(record.friction_W.values())
     assert heat == pytest.approx(friction, rel=1e-12)
-    assert sum(record["carried_off_W"].values()) == pytest.approx(heat, rel=1e-12)
-    assert record["path_heat_W"][-1] == pytest.approx(heat, rel=1e-9)
+    assert sum(record.carried_off_W.values()) == pytest.approx(heat, rel=1e-12)
+    assert record.path_heat_W[-1] == pytest.approx(heat, rel=1e-9)
     nodes = np.array(list(result.temperatures_C.values()))
     assert np.abs(balance(scene, nodes).deviation).max() <= 1e-9
     for guess in (-10.0, 140.0):
@@ -90,11 +90,11 @@ def test_invariant_steady_temperatures(tables):
     same = rbdyn.equilibrium(stated(scene, result.temperatures_C))
     assert same.report.balls == result.report.balls and same.report.contacts == result.report.contacts
     assert same.thermal is None and "thermal" not in same.as_dict() and "temperatures_C" not in same.as_dict()
-    ranges = record["ranges"]
+    ranges = record.ranges.figures
     assert list(ranges) == [*NODES, "inner_minus_outer_K", "radial_um"]
     for node in NODES:
         assert ranges[node][0] < result.temperatures_C[node] < ranges[node][-1]
-    assert ranges["radial_um"][0] < record["clearance_um"]["operating"] < ranges["radial_um"][-1]
+    assert ranges["radial_um"][0] < record.clearance_um["operating"] < ranges["radial_um"][-1]
 
 
 def test_example_preload_grows_with_the_heat():
@@ -103,7 +103,7 @@ def test_example_preload_grows_with_the_heat():
     del tables["thermal"]
     warm = rbdyn.equilibrium(hot)
     assert warm.reaction["load_N"]["z"] == pytest.approx(3069.0, rel=2e-3)
-    assert warm.thermal["gain"] == pytest.approx(0.0112, abs=5e-4)
+    assert warm.thermal.gain == pytest.approx(0.0112, abs=5e-4)
     assert [warm.temperatures_C[node] for node in NODES] == pytest.approx([52.4, 61.3, 75.6, 76.6], abs=0.1)
     cold = rbdyn.equilibrium(Scene.from_dict(tables))
     assert cold.reaction["load_N"]["z"] == pytest.approx(1872.0, rel=2e-3)
@@ -136,15 +136,11 @@ def test_unit_runaway_without_a_way_to_expand(tables, fast):
     rigid = scene_of(tables, mounting__housing_material=RIGID, operation__inner_speed_rpm=fast)
     result = rbdyn.equilibrium(rigid)
     record = result.thermal
-    assert (
-        result.status.startswith("no steady state: ")
-        and record["status"] == "no steady state"
-        and record["gain"] >= 1.0
-    )
-    assert result.report is None and not result.is_equilibrium and "thermal loop gain" in record["reason"]
-    inner, clearance = [state["inner"] for state in record["path_C"]], record["path_clearance_um"]
+    assert result.status.startswith("no steady state: ") and record.status == "no steady state" and record.gain >= 1.0
+    assert result.report is None and not result.is_equilibrium and "thermal loop gain" in record.reason
+    inner, clearance = [state["inner"] for state in record.path_C], record.path_clearance_um
     assert inner == sorted(inner) and clearance == sorted(clearance, reverse=True)
-    assert record["path_heat_W"][-1] > 2.0 * record["path_heat_W"][-4] > 0.0
+    assert record.path_heat_W[-1] > 2.0 * record.path_heat_W[-4] > 0.0
     assert rbdyn.equilibrium(scene_of(tables, operation__inner_speed_rpm=fast)).status == "ok"
 
 
@@ -172,7 +168,7 @@ def test_unit_limits_of_the_network():
     idle = scene_of(DEEP, operation__radial_load_N=0.0, bearing__radial_clearance_mm=0.08)
     result = rbdyn.equilibrium(idle)
     assert list(result.temperatures_C.values()) == pytest.approx([20.0] * 4, abs=1e-4)
-    assert 0.0 <= sum(result.thermal["friction_W"].values()) < 1e-4
+    assert 0.0 <= sum(result.thermal.friction_W.values()) < 1e-4
 
 
 def test_unit_heat_by_effusivity():
@@ -202,7 +198,7 @@ def test_unit_too_hot_and_seizure():
         hot.status.startswith("too hot: the oil reaches ") and hot.temperatures_C["oil"] > 30.0 and hot.report is None
     )
     seized = rbdyn.equilibrium(scene_of(SPINDLE, operation__preload_um=1500.0))
-    assert seized.status.startswith("seizure: ") and seized.thermal["gain"] is None and not seized.is_equilibrium
+    assert seized.status.startswith("seizure: ") and seized.thermal.gain is None and not seized.is_equilibrium
 
 
 @pytest.mark.parametrize(
@@ -244,7 +240,7 @@ def test_unit_oil_too_thick_for_the_friction_model_is_a_note():
     cold = rbdyn.equilibrium(
         scene_of(DEEP, lubricant__oil="ISO VG 460", lubricant__supply="oil_air", thermal__ambient_C=-40.0)
     )
-    assert cold.thermal["friction_W"]["rolling"] < 1.0
+    assert cold.thermal.friction_W["rolling"] < 1.0
     assert any("starvation factor" in note for note in cold.notes)
     assert not any("starvation factor" in note for note in rbdyn.equilibrium(scene_of(DEEP)).notes)
 
@@ -268,8 +264,8 @@ def test_unit_sweep_over_a_runaway():
     assert swept.failures == {"no steady state": [2]} and swept.statuses[1] == "ok"
     for node in NODES:
         assert swept.columns[f"{node}_temperature_C"][1] == alone.temperatures_C[node]
-    assert swept.columns["thermal_gain"][1] == alone.thermal["gain"]
-    assert swept.columns["friction_W"][1] == sum(alone.thermal["friction_W"].values())
+    assert swept.columns["thermal_gain"][1] == alone.thermal.gain
+    assert swept.columns["friction_W"][1] == sum(alone.thermal.friction_W.values())
     assert np.isnan(swept.columns["oil_temperature_C"][2])
 
 
@@ -326,7 +322,7 @@ def test_unit_temperatures_reach_every_part():
 def test_unit_ranges_are_those_of_full_solutions(tables):
     """Unit: ranges are within 0.3 K of those of a search to 1e-9 K for each of the 256 sets, also where the preload grows with the heat."""
     scene = scene_of(tables)
-    ranges = rbdyn.equilibrium(scene).thermal["ranges"]
+    ranges = rbdyn.equilibrium(scene).thermal.ranges.figures
     sets = input_sets(scene, ())
     rows = []
     for place in range(SETS):

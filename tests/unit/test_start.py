@@ -216,7 +216,7 @@ def test_tight_cage_seizes_during_the_start():
     """Verdict: a cage with guide clearance enough when steady, whose land stays cold in winter, seizes at a stated moment."""
     seized = simulate(_scene(start={"from_C": -20.0}, cage={"guide_clearance_mm": 0.075}), workers=2, notice=None)
     start = seized.start
-    assert seized.thermal["status"] == "steady" and seized.clearance_um["guide"]["operating"] > 20.0
+    assert seized.thermal.status == "steady" and seized.clearance_um["guide"]["operating"] > 20.0
     assert seized.status == start.status == "seizure" and "the guide clearance of the cage is lost" in start.reason
     assert "by half of the simulations after" in start.reason and not any("failed" in note for note in seized.notes)
     floor = 2.0 * _scene().model.land_film_floor_um
@@ -306,8 +306,7 @@ def test_unit_nothing_without_a_start(cold):
     plain = simulate(_scene(), workers=2, notice=None)
     assert plain.start is None and "start" not in plain.as_dict() and "start" not in plain.scene["thermal"]
     assert plain.figures == cold.figures and plain.temperatures_C == cold.temperatures_C
-    before, after = dict(plain.thermal), dict(cold.thermal)
-    assert before == after
+    assert plain.thermal == cold.thermal
     code = """
 import sys
 from doe.clearance import responses_of

@@ -26,7 +26,7 @@ from doe.workflow.uncertainty import find_uncertainty, uncertainty_stages
 from doe.workflow.whole import check_study, operating_clearances
 from rbdyn.base.faults import InputError
 from rbdyn.dynamics import simulate as simulation
-from rbdyn.result import TEMPERATURES, Quantity
+from rbdyn.result import TEMPERATURES, HeatBalance, Quantity, Ranges
 from rbdyn.scene import Scene
 
 HOT = EXAMPLES / "hot_roller.toml"
@@ -52,10 +52,20 @@ def hot_study(folder: Path, change: tuple[str, str] = ("", "")) -> Path:
 def hot_result(scene: Scene, status: str = "steady", reason: str = ""):
     """A result in no time, with a heat balance."""
     figures = {node: Quantity(value, 0.1, 0.05, 10.0, 9) for node, value in WARM.items()}
-    ranges = {node: [value - 5.0, value, value + 15.0] for node, value in WARM.items()}
-    record = {"status": status, "ranges": ranges, "path_C": [WARM]} | ({"reason": reason} if reason else {})
+    ranges = Ranges({node: (value - 5.0, value, value + 15.0) for node, value in WARM.items()})
+    nothing = {key: {} for key in ("heat_W", "carried_off_W", "conductances_W_K")}
+    balance = HeatBalance(
+        status=status,
+        reason=reason or None,
+        gain=0.1,
+        windage_W=0.0,
+        ranges=ranges,
+        oil_fraction=None,
+        path_C=[WARM],
+        **nothing,
+    )
     own = "ok" if status == "steady" else status
-    return replace(instant_result(scene), status=own, temperatures_C=figures, thermal=record)
+    return replace(instant_result(scene), status=own, temperatures_C=figures, thermal=balance)
 
 
 def test_unit_the_example_study_is_sound():
@@ -124,7 +134,7 @@ def test_unit_a_confirmed_point_is_hot(tmp_path):
     study = Problem.load(hot_study(tmp_path))
     scene = study.confirmation_scene(study.baseline)
     confirmed = confirmed_from(study, Choice(study.baseline, ""), hot_result(scene))
-    assert confirmed.values[-1] == 93.0 and confirmed.result.thermal["ranges"]["inner"] == [88.0, 93.0, 108.0]
+    assert confirmed.values[-1] == 93.0 and confirmed.result.thermal.ranges.figures["inner"] == (88.0, 93.0, 108.0)
     hot = confirmed.hot[EVERYWHERE]
     assert hot.thermal is None and hot.mounting.inner_ring_temperature_C == 93.0 and hot.lubricant.temperature_C == 92.7
     found = operating_clearances(study, {"baseline": hot, "pick": hot}).operating

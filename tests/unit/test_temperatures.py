@@ -61,11 +61,11 @@ def hot() -> SimulationResult:
 def test_unit_heat_in_is_heat_out(hot):
     """Unit: losses and windage heat the nodes, all of it leaves, and the temperatures are those of a plain iteration."""
     balance = hot.thermal
-    assert hot.status == "ok" and balance["status"] == "steady"
-    heat = sum(balance["heat_W"].values())
-    assert heat == pytest.approx(sum(hot.power_terms_W.values()) + balance["windage_W"], rel=1e-12)
-    assert sum(balance["carried_off_W"].values()) == pytest.approx(heat, rel=1e-12)
-    state = balance["path_C"][-1]
+    assert hot.status == "ok" and balance.status == "steady"
+    heat = sum(balance.heat_W.values())
+    assert heat == pytest.approx(sum(hot.power_terms_W.values()) + balance.windage_W, rel=1e-12)
+    assert sum(balance.carried_off_W.values()) == pytest.approx(heat, rel=1e-12)
+    state = balance.path_C[-1]
     assert {node: figure.value for node, figure in hot.temperatures_C.items()} == pytest.approx(state, abs=0.4)
     again = simulate(_scene(lubricant={**FLOW, "temperature_C": 130.0}), workers=1, notice=None)
     for node, figure in hot.temperatures_C.items():
@@ -89,7 +89,7 @@ def test_unit_figures_are_those_of_the_scene_at_its_temperatures(hot):
     alone = simulate(plain, workers=1, notice=None)
     assert alone.impact_force_N == hot.impact_force_N and alone.power_loss_W == hot.power_loss_W
     assert alone.clearance_um == hot.clearance_um and alone.thermal is None
-    state = hot.thermal["path_C"][-1]
+    state = hot.thermal.path_C[-1]
     films = plain.film_temperatures_C
     assert films.outer == pytest.approx(0.5 * (state["outer"] + state["rollers"]))
     assert films.inner == pytest.approx(0.5 * (state["inner"] + state["rollers"]))
@@ -148,9 +148,9 @@ def test_unit_a_polymer_cage_that_grows_into_its_land_is_a_verdict():
         lubricant={**FLOW, "oil_inlet_temperature_C": 75.0},
     )
     result = simulate(scene, workers=1, notice=None)
-    assert result.status == "seizure" == result.thermal["status"]
+    assert result.status == "seizure" == result.thermal.status
     assert (
-        "the cage seizes" in result.thermal["reason"]
+        "the cage seizes" in result.thermal.reason
         and result.notes[0].startswith("seizure: ")
         and result.notes[0].code == "seizure"
     )
@@ -160,13 +160,13 @@ def test_unit_a_polymer_cage_that_grows_into_its_land_is_a_verdict():
     long = list[tuple[int, int]]()
     with pytest.raises(RunError) as caught:
         simulate(scene, 1, lambda done, total: long.append((done, total)), notice=None, only_steady=True)
-    assert str(caught.value) == f"{result.status}: {result.thermal['reason']}" and not long
+    assert str(caught.value) == f"{result.status}: {result.thermal.reason}" and not long
 
 
 def test_unit_above_a_ceiling():
     """Unit: oil above its ceiling is a status of its own, with figures."""
     result = simulate(_scene(thermal={"oil_ceiling_C": 85.0}), workers=1, notice=None)
-    assert result.status == "too hot" and "thermal.oil_ceiling_C" in result.thermal["reason"]
+    assert result.status == "too hot" and "thermal.oil_ceiling_C" in result.thermal.reason
     assert result.temperatures_C["oil"].value > 85.0
 
 
@@ -177,7 +177,7 @@ def test_unit_a_cage_too_hot_by_default_of_its_material():
         "cage": {"guidance": "roller", "mass_g": 7.0, "pocket_radial_clearance_mm": 0.6},
     }
     result = simulate(_scene(**changes, thermal={"cage_offset_K": 60.0}), workers=1, notice=None)
-    assert result.status == "too hot" and "thermal.cage_ceiling_C" in result.thermal["reason"]
+    assert result.status == "too hot" and "thermal.cage_ceiling_C" in result.thermal.reason
 
 
 BATH = {"oil": "MIL-L-7808", "supply": "bath"}
@@ -323,7 +323,7 @@ def test_unit_a_flow_gives_the_oil_fraction():
 
 def test_unit_ranges_hold_what_inputs_leave_open(hot):
     """Unit: the range of each temperature holds its value, and a stated factor is exact and narrows it."""
-    ranges, state = hot.thermal["ranges"], {node: figure.value for node, figure in hot.temperatures_C.items()}
+    ranges, state = hot.thermal.ranges.figures, {node: figure.value for node, figure in hot.temperatures_C.items()}
     assert list(ranges) == [*state, "inner_minus_outer_K", "radial_um", "guide_um", "pocket_um"]
     for node, value in state.items():
         assert ranges[node][0] <= value <= ranges[node][-1] and ranges[node][-1] - ranges[node][0] > 5.0
@@ -334,10 +334,10 @@ def test_unit_ranges_hold_what_inputs_leave_open(hot):
     levels = {"model": {"rolling_resistance_factor": 1.0}}
     alone = simulate(_scene(thermal=exact, **levels), workers=1, notice=None)
     stated = alone.thermal
-    assert stated["inputs"] == [] and all(low == high for low, _, high in stated["ranges"].values())
+    assert stated.ranges.inputs == () and all(low == high for low, _, high in stated.ranges.figures.values())
     for node, figure in alone.temperatures_C.items():
-        assert stated["ranges"][node][1] == pytest.approx(figure.value, abs=1e-3)
-    assert stated["ranges"]["guide_um"][1] == pytest.approx(alone.clearance_um["guide"]["operating"], abs=0.05)
+        assert stated.ranges.figures[node][1] == pytest.approx(figure.value, abs=1e-3)
+    assert stated.ranges.figures["guide_um"][1] == pytest.approx(alone.clearance_um["guide"]["operating"], abs=0.05)
 
 
 def test_unit_a_scene_without_a_balance_loads_nothing_of_it():
@@ -356,7 +356,7 @@ def test_unit_a_scene_without_a_balance_loads_nothing_of_it():
 def test_unit_errors_of_temperatures_are_those_of_the_heat(hot):
     """Unit: the error of the oil's temperature is about that of the loss over the conductance of its flow."""
     loss, oil = hot.power_loss_W, hot.temperatures_C["oil"]
-    flow = hot.thermal["conductances_W_K"]["flow"]
+    flow = hot.thermal.conductances_W_K["flow"]
     assert oil.statistical_error == pytest.approx(loss.statistical_error / flow, rel=0.5)
     assert oil.numerical_error is not None and math.isfinite(oil.numerical_error)
     assert np.isfinite([figure.error for figure in hot.temperatures_C.values()]).all()
@@ -366,7 +366,7 @@ def test_unit_heat_without_a_way_out_is_too_hot():
     """Unit: constant heat that would need more than 350 C has no gain of one, so it is too hot; no note takes 350 C for kelvin."""
     ways = {"housing_factor": 0.0, "shaft_factor": 0.0}
     result = simulate(_scene(lubricant={"oil_flow_l_min": 1e-3}, thermal=ways), workers=1, notice=None)
-    assert result.status == "too hot" and "beyond 350 C" in result.thermal["reason"] and result.thermal["gain"] < 1.0
+    assert result.status == "too hot" and "beyond 350 C" in result.thermal.reason and result.thermal.gain < 1.0
     assert not any(" K are meant" in note for note in result.notes)
 
 
@@ -377,8 +377,8 @@ def test_unit_a_run_that_does_not_close_is_undecided(monkeypatch):
     monkeypatch.setattr(temperatures, "MOST_WHOLE_RUNS", 1)
     monkeypatch.setattr(temperatures, "corrected", lambda state, slopes: state.temperatures + 5.0)
     result = simulate(_scene(), workers=1, notice=None)
-    assert result.status == "undecided" == result.thermal["status"] and result.thermal["ranges"] is None
-    assert "move by 5 K" in result.thermal["reason"] and "numerics.turns" in result.thermal["reason"]
+    assert result.status == "undecided" == result.thermal.status and result.thermal.ranges.figures is None
+    assert "move by 5 K" in result.thermal.reason and "numerics.turns" in result.thermal.reason
     assert all(figure.statistical_error is None for figure in result.temperatures_C.values())
 
 
@@ -390,11 +390,11 @@ def test_unit_a_cold_start_is_steady(oil, inlet):
     changes = {"lubricant": {**FLOW, "oil": oil, "oil_inlet_temperature_C": inlet}, "thermal": {"ambient_C": inlet}}
     numerics = {**SHORT, "turns": 4.0, "discard_turns": 2.0, "impact_window_turns": 2.0}
     found = simulate(_scene(**changes, numerics=numerics), workers=1, notice=None)
-    assert found.status == "ok" and found.thermal["gain"] < 0.7
+    assert found.status == "ok" and found.thermal.gain < 0.7
     assert min(figure.value - (figure.error or 0.0) for figure in found.temperatures_C.values()) > inlet
-    assert all(min(state.values()) >= inlet - 1e-9 for state in found.thermal["path_C"][1:])
-    heat = sum(found.thermal["heat_W"].values())
-    assert sum(found.thermal["carried_off_W"].values()) == pytest.approx(heat, rel=1e-9)
+    assert all(min(state.values()) >= inlet - 1e-9 for state in found.thermal.path_C[1:])
+    heat = sum(found.thermal.heat_W.values())
+    assert sum(found.thermal.carried_off_W.values()) == pytest.approx(heat, rel=1e-9)
 
 
 def test_unit_ranges_follow_the_exponents_that_the_search_found():
@@ -405,8 +405,8 @@ def test_unit_ranges_follow_the_exponents_that_the_search_found():
     }
     numerics = {**SHORT, "turns": 4.0, "discard_turns": 2.0, "impact_window_turns": 2.0}
     found = simulate(_scene(**cold, numerics=numerics), workers=1, notice=None)
-    assert found.thermal["share_without_steady_state"] == 0.0
-    assert found.thermal["ranges"]["inner"][-1] < found.temperatures_C["inner"].value + 75.0
+    assert found.thermal.ranges.unsteady == 0.0
+    assert found.thermal.ranges.figures["inner"][-1] < found.temperatures_C["inner"].value + 75.0
 
 
 def test_unit_ways_out_of_a_bath():
@@ -416,7 +416,7 @@ def test_unit_ways_out_of_a_bath():
         tables = _tables(thermal=thermal) | {"lubricant": BATH}
         tables["numerics"] |= {"turns": 4.0, "discard_turns": 2.0, "impact_window_turns": 2.0}
         result = simulate(Scene.from_dict(tables), workers=1, notice=None)
-        return {node: figure.value for node, figure in result.temperatures_C.items()}, result.thermal["carried_off_W"]
+        return {node: figure.value for node, figure in result.temperatures_C.items()}, result.thermal.carried_off_W
 
     with_sump, ways = nodes()
     without, dry = nodes(sump_factor=0.0)
@@ -452,7 +452,7 @@ def test_unit_a_search_from_a_similar_bearing_needs_no_turn_of_its_own(hot):
     changes = {"numerics": numerics, "bearing": {"radial_clearance_mm": 0.024}, "cage": {"guide_clearance_mm": 0.18}}
     far = simulate(_scene(**changes), workers=1, notice=None)
     near = simulate(_scene(**changes, thermal={"near": _near(hot)}), workers=1, notice=None)
-    assert near.status == "ok" and near.thermal["status"] == "steady"
+    assert near.status == "ok" and near.thermal.status == "steady"
     turns = numerics["replicates"] * (numerics["discard_turns"] + 3.0 + numerics["turns"])
     assert near.cost["turns"] == pytest.approx(turns) and near.cost["turns"] < 0.5 * far.cost["turns"]
     for node, figure in far.temperatures_C.items():
@@ -472,7 +472,7 @@ def test_unit_a_search_from_another_bearing_begins_anew(hot, changes):
     far = simulate(_scene(), workers=1, notice=None)
     near = simulate(_scene(thermal={"near": _near(hot, **changes)}), workers=1, notice=None)
     assert near.temperatures_C == far.temperatures_C and near.impact_force_N == far.impact_force_N
-    assert near.cost["turns"] > far.cost["turns"] and near.thermal["slopes"] == far.thermal["slopes"]
+    assert near.cost["turns"] > far.cost["turns"] and near.thermal.slopes == far.thermal.slopes
     assert near.power_loss_W.value == pytest.approx(far.power_loss_W.value, rel=2e-3)
 
 
