@@ -127,15 +127,15 @@ def blocks(result: Summary) -> list[Block]:
         changes(result),
         *costs(result),
         duty_figures(result).block,
-        *chains(result, {}).blocks,
-        *reference(result, {}).blocks,
-        *diagnostics(result, {}).blocks,
+        *chains(result).blocks,
+        *reference(result).blocks,
+        *diagnostics(result).blocks,
     ]
     return readable(
         [
             Verdict(tuple(result.notes), good=good_news(result)),
             *first_screen(result),
-            *notes(result, {}).blocks,
+            *notes(result).blocks,
             *(replace(block, detail=Detail.ALL) for block in details),
         ],
         result.asked,

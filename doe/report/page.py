@@ -70,7 +70,24 @@ def window_title(summary: Summary) -> str:
 
 def sections(summary: Summary, motion: Motions = MappingProxyType({})) -> list[Section]:
     """Sections with something to say."""
-    chapters = [chapter(summary, motion) for chapter in CHAPTERS]
+    chapters = [
+        answer.answer(summary),
+        identity_section(summary.identity),
+        duty.duty(summary),
+        answer.settings(summary),
+        design.design(summary),
+        fit.surfaces(summary),
+        fit.diagnostics(summary),
+        front.front(summary),
+        answer.confirmation(summary),
+        unknown.robustness(summary),
+        chain.chains(summary),
+        answer.power(summary),
+        answer.motion(motion),
+        reference(summary),
+        settings(summary),
+        notes(summary),
+    ]
     filled = [replace(section, blocks=readable(section.blocks, summary.asked)) for section in chapters if section]
     return [section for section in filled if section.blocks]
 
@@ -198,7 +215,7 @@ def _surfaces(summary: Summary) -> list[dict[str, Any]]:
     ]
 
 
-def reference(summary: Summary, motion: Motions) -> Section:
+def reference(summary: Summary) -> Section:
     """Levels, effects and ranks compared with a published table, with the reasons for what differs."""
     levels, effects, words = [], [], []
     for name, row in summary.published_comparisons.items():
@@ -218,12 +235,7 @@ def reference(summary: Summary, motion: Motions) -> Section:
     return Section("reference", "Compared with the published table", blocks)
 
 
-def identity(summary: Summary, motion: Motions) -> Section | None:
-    """Bearing, operating point, date and hashes of the input files."""
-    return identity_section(summary.identity)
-
-
-def settings(summary: Summary, motion: Motions) -> Section:
+def settings(summary: Summary) -> Section:
     """Seeds, versions and cost: what it takes to get the same numbers again."""
     tables: dict[str, Mapping[str, Any]] = {
         "Seeds": summary.seeds,
@@ -234,28 +246,8 @@ def settings(summary: Summary, motion: Motions) -> Section:
     return Section("settings", "Settings, versions, cost", blocks)
 
 
-def notes(summary: Summary, motion: Motions) -> Section:
+def notes(summary: Summary) -> Section:
     """Runs that failed, and limits of the model that the runs met."""
     return Section(
         "notes", "Notes and failures", [failure_table(summary.failures), Remarks(tuple(summary.notes), gathers=True)]
     )
-
-
-CHAPTERS = (
-    answer.answer,
-    identity,
-    duty.duty,
-    answer.settings,
-    design.design,
-    fit.surfaces,
-    fit.diagnostics,
-    front.front,
-    answer.confirmation,
-    unknown.robustness,
-    chain.chains,
-    answer.power,
-    answer.motion,
-    reference,
-    settings,
-    notes,
-)

@@ -51,7 +51,7 @@ SENTENCE_END = re.compile(r"(?<=\.) (?=[A-Z])")
 LIMITS_NOTE = "A limit is met or violated if the value is on that side of it by more than its error, otherwise undecided. The probability of meeting it follows from that error."
 
 
-def answer(summary: Summary, motion: Mapping[str, Any]) -> Section | None:
+def answer(summary: Summary) -> Section:
     """What an engineer acts on, in the order of a first screen."""
     return Section("answer", "The answer", first_screen(summary))
 
@@ -351,7 +351,7 @@ def _verdict(limit: Limit) -> tuple[str, str]:
     return LIMITS[limit.verdict], "" if limit.probability is None else chance(limit.probability)
 
 
-def settings(summary: Summary, motion: Mapping[str, Any]) -> Section:
+def settings(summary: Summary) -> Section:
     """Factors, responses and scene as the study states them."""
     asked = summary.asked
     effort = (
@@ -398,7 +398,7 @@ def _goal(response: Response) -> tuple[str, str, str, str]:
     return goal, ", ".join(limits), shown(response.weight), response.model
 
 
-def confirmation(summary: Summary, motion: Mapping[str, Any]) -> Section:
+def confirmation(summary: Summary) -> Section:
     """Simulated responses at every confirmed point compared with those that the surfaces predicted."""
     points, asked = summary.confirmation, summary.asked
     header = ["point", *map(label, asked.columns), *map(label, asked.names)]
@@ -467,7 +467,7 @@ def tolerances(widths: Mapping[str, FactorTolerance]) -> Table:
 ROW = 34.0  # height of the bars of a term [pt]
 
 
-def power(summary: Summary, motion: Mapping[str, Any]) -> Section:
+def power(summary: Summary) -> Section:
     """Power by term at the confirmed points, baseline and pick as bars."""
     confirmed = {point_words(name): point for name, point in summary.confirmation.items()}
     points = {name: point.power_terms_W for name, point in confirmed.items() if point.power_terms_W}
@@ -500,7 +500,7 @@ def _watts(value: float | None) -> str:
     return "" if value is None else f"{value:.2f}" if abs(value) < 100.0 else f"{value:.1f}"
 
 
-def motion(summary: Summary, motion: Mapping[str, DrawnMotion]) -> Section | None:
+def motion(motion: Mapping[str, DrawnMotion]) -> Section | None:
     """Orbits of the cage centre, and the moving bearing."""
     if not motion:
         return None

@@ -44,7 +44,7 @@ NAMES: tuple[Column[Any], ...] = (Column("chain", label, at=0, meaning="names"),
 DRAWN: Column[SizeRow] = Column("", words="size [mm]", cell=lambda row: row[2].drawn)
 
 
-def chains(summary: Summary, motion: Mapping[str, Any]) -> Section:
+def chains(summary: Summary) -> Section:
     """Of each chain a stacked bar of contributions, the yields by distribution and all other figures."""
     blocks: list[Block] = []
     for name, chain in summary.chains.items():

@@ -47,7 +47,7 @@ def design_sheet(factors: Sequence[str], runs: Sequence[StandardRun] = ()) -> Sh
     return Sheet("Runs", columns, runs, file="design.csv", content="One row per run of the design, in its order.")
 
 
-def design(summary: Summary, motion: Mapping[str, Any]) -> Section:
+def design(summary: Summary) -> Section:
     """Points table and evaluation."""
     result = summary.design
     kind = result.kind.replace("_", " ")

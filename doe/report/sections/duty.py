@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from doe.report.still import COLOURS, GUIDE, Still, name_marks
 from doe.report.summary import LIMITS, SIGNS_NOTE, Summary, change, signed
@@ -32,7 +32,7 @@ ROW, AROUND, LETTER = 26.0, 64.0, 6.0
 LONGEST = 24  # letters of a name in a picture
 
 
-def duty(summary: Summary, motion: Mapping[str, Any]) -> Section | None:
+def duty(summary: Summary) -> Section | None:
     """The points of the duty with all figures there."""
     if summary.duty is None:
         return None

@@ -82,7 +82,7 @@ RUNS = Sheet(
 )  # fmt: skip
 
 
-def surfaces(summary: Summary, motion: Mapping[str, Any]) -> Section:
+def surfaces(summary: Summary) -> Section:
     """The interactive surfaces, and their coefficients."""
     fitted, factors = summary.fit.responses, summary.asked.factors
     terms = list(dict.fromkeys(term for surface in fitted.values() for term in surface.by_term))
@@ -115,7 +115,7 @@ def _coefficient(value: float | None, error: float | None) -> str:
     return "–" if value is None else with_error(value, error)
 
 
-def diagnostics(summary: Summary, motion: Mapping[str, Any]) -> Section:
+def diagnostics(summary: Summary) -> Section:
     """Analysis of variance with its sentences, and pictures of the residuals, response by response."""
     fits = list(summary.fit.responses.values())
     blocks: list[Block] = [Sheet("Quality of the fits", QUALITY, fits).block]

@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import numpy as np
 
@@ -40,7 +39,7 @@ def front_sheet(factors: Sequence[str], responses: Sequence[str], points: Sequen
     return Sheet("Front", columns, points, file="front.csv", content="One row per point of the front.")
 
 
-def front(summary: Summary, motion: Mapping[str, Any]) -> Section:
+def front(summary: Summary) -> Section:
     """Pictures that answer to the pointer, the picks, and what they are compared with."""
     marks, result = picks(summary), summary.front
     where = f"of the {WITHOUT}" if "without_tolerances" in marks else "of the selected design"

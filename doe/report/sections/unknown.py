@@ -1,7 +1,7 @@
 """Unknown inputs: their effect on the figures of a scene (``doe uncertainty``) and on the pick of a study (``--robust``)."""
 
 import csv
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -245,7 +245,7 @@ DECIDERS = Sheet(
 )  # fmt: skip
 
 
-def robustness(summary: Summary, motion: Mapping[str, Any]) -> Section | None:
+def robustness(summary: Summary) -> Section | None:
     """Odds that the pick is better, the inputs that decide it, and every unknown input with its range and source."""
     robust = summary.robust
     if robust is None:
