@@ -16,8 +16,8 @@ from rbdyn.base.blocks import Block, Detail, Section, Table, Widget, has_content
 from rbdyn.base.faults import LONGEST_NAME, InputError, one_line, path_of, refuse
 from rbdyn.base.files import write_json
 from rbdyn.base.folder import OutputFolder, output_folder
+from rbdyn.base.html import REPORT_FILES, with_report
 from rbdyn.base.identity import Identity, identity_line
-from rbdyn.base.page import REPORT_FILES, with_report
 
 if TYPE_CHECKING:
     import pandas as pd

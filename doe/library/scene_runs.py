@@ -158,10 +158,10 @@ def run_answer(
 ) -> RunsAnswer:
     """What the command ``doe run`` prints; arguments as those of ``run``."""
     from doe.library.studies import SHORTER
-    from doe.running.queue import gather, part_folder, refuse_other_parts, rows_of
+    from doe.running.runner import gather, part_folder, refuse_other_parts, rows_of
     from doe.workflow.scene_table import RowRun, read_scene_table, rows_stage, run_rows, table_digest
+    from rbdyn.base.html import REPORT_FILES, write_with_report
     from rbdyn.base.identity import identity_of
-    from rbdyn.base.page import REPORT_FILES, write_with_report
 
     content: Any = table if hasattr(table, "columns") else path_given(table, "table")
     base, target = optional_path(scene, "scene"), optional_path(out, "out")

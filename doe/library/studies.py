@@ -211,7 +211,7 @@ def study(
     A broken limit is in ``answer["status"]`` and ``answer["limits"]``. Raises InputError with all faults of the
     study, RunError where too many runs fail.
     """
-    from doe.running.queue import gather, refuse_other_parts
+    from doe.running.runner import gather, refuse_other_parts
     from doe.workflow.problem import Problem
     from doe.workflow.status import finished_record, inputs_digest
 
@@ -244,7 +244,7 @@ def study(
 
 def _part(path: Path, target: Path, share: tuple[int, int], effort: Effort, force: bool) -> PartAnswer:
     """The design runs of a part. Raises as ``study``."""
-    from doe.running.queue import part_folder, refuse_other_parts
+    from doe.running.runner import part_folder, refuse_other_parts
     from doe.running.store import Failure
     from doe.workflow.problem import Problem
     from doe.workflow.status import inputs_digest
@@ -328,7 +328,7 @@ def uncertainty(
     from doe.running.runner import ANSWER
     from doe.workflow.status import content_digest, runs_digest, scene_identity
     from doe.workflow.uncertainty import find_uncertainty, uncertainty_stages
-    from rbdyn.base.page import REPORT_FILES, write_with_report
+    from rbdyn.base.html import REPORT_FILES, write_with_report
     from rbdyn.dynamics.target import target_of, valid_target
 
     path, assignments = path_given(path, "path"), texts_given(overrides, "overrides", '["cage.mass_g=50"]')

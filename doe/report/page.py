@@ -25,7 +25,7 @@ from doe.workflow.front_record import EstimatedPoint, Point, RobustPoint
 from doe.workflow.problem import Asked, Factor, Response
 from rbdyn.base import html
 from rbdyn.base.blocks import Block, Bullets, Remarks, Section, Table, Verdict, Widget
-from rbdyn.base.page import identity_section, page
+from rbdyn.base.html import identity_section, page
 from rbdyn.base.words import label, quantity, rounded_down, shown
 
 # Motions by the name of their point.

@@ -20,8 +20,7 @@ from doe.dimension_chain.allocation import Allocation
 from doe.dimension_chain.refusal import allocated_reason
 from doe.duty import OPERATION, Duty, Simulated, scene_at
 from doe.pareto import ParetoFront
-from doe.running.queue import Part, rows_of
-from doe.running.runner import ANSWER, AgendaKeeper, Stage
+from doe.running.runner import ANSWER, AgendaKeeper, Part, Stage, rows_of
 from doe.running.store import Failure
 from doe.workflow.adaptive import Adaptive, FrontComparison, advice, check_adaptive, compare_fronts, find_adaptive
 from doe.workflow.confirmation import (

@@ -25,9 +25,20 @@ from rbdyn.properties.catalogue import cage_estimate, envelope, read_designation
 from rbdyn.properties.materials import MATERIALS, equivalent_modulus
 from rbdyn.properties.oils import BASE_OILS, grade_oil
 from rbdyn.scene.thermal import Thermal
-from rbdyn.thermal.conductances import CageSize, race_contact, seats, sump, surface_coefficient, surfaces
 from rbdyn.thermal.losses import TERMS, Effusivities, shares
-from rbdyn.thermal.network import INNER, OUTER, Boundaries, Conductances, temperatures
+from rbdyn.thermal.network import (
+    INNER,
+    OUTER,
+    Boundaries,
+    CageSize,
+    Conductances,
+    race_contact,
+    seats,
+    sump,
+    surface_coefficient,
+    surfaces,
+    temperatures,
+)
 
 SIZES = ("204", "206", "208", "210", "215", "220", "308", "314", "320", "1020", "2210", "2312")
 LOAD_SHARE = 0.05  # of C0

@@ -24,10 +24,10 @@ from typer.main import get_command
 from rbdyn.base.blocks import Block, Detail
 from rbdyn.base.faults import LONGEST_NAME, InputError, MethodError, RunError, one_line, refuse
 from rbdyn.base.folder import OutputFolder, output_folder
+from rbdyn.base.html import write_with_report
 from rbdyn.base.identity import Identity, identity_line
 from rbdyn.base.loading import INTERRUPTED
 from rbdyn.base.notes import DANGER, Note, condensed, of_level
-from rbdyn.base.page import write_with_report
 from rbdyn.base.records import plain
 from rbdyn.base.streams import FAILED, escaped, styled
 from rbdyn.base.terminal import show

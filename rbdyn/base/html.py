@@ -1,13 +1,17 @@
-"""Blocks as HTML, where every text is escaped, and vector copies of the pictures that a command draws, for its page.
+"""A report as one HTML page that can be mailed: it fetches nothing and can be read without scripts and on paper.
 
-Whoever draws into a file asks ``is_copying`` and hands over the same picture as SVG by ``add_copy``.
+Blocks are rendered with every text escaped. Whoever draws into a file asks ``is_copying`` and hands over the same picture as SVG
+by ``add_copy``. ``page`` fills the skeleton ``page.html`` with the style sheet ``report.css``; ``result_page`` is that of a
+command with a result and pictures: the blocks of the terminal first, the table of the identity last.
 """
 
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
+from dataclasses import replace
 from html import escape
+from importlib.resources import files
 from itertools import groupby
 from pathlib import Path
 
@@ -25,6 +29,10 @@ from rbdyn.base.blocks import (
     Widget,
     has_content,
 )
+from rbdyn.base.folder import OutputFolder
+from rbdyn.base.identity import Identity, identity_line, identity_table
+from rbdyn.base.words import filled_page
+from rbdyn.base.workbook import NAME, write_workbook
 
 # Classes of the style sheet by the role of a paragraph.
 CLASSES = {"": "", "small": ' class="note"'} | {role: f' class="{role}"' for role in ("statement", "danger", "warning")}
@@ -122,7 +130,7 @@ _copies: ContextVar[dict[str, str] | None] = ContextVar("copies", default=None)
 # What a page does not need of an SVG file: declarations, its style sheet (which would hold for the page), sizes, metadata.
 FILE_ONLY = re.compile(r"^.*?(?=<svg)|<metadata>.*?</metadata>|<style.*?</style>|<!--.*?-->", re.DOTALL)
 OPENING, VIEW = re.compile(r"<svg[^>]*>"), re.compile(r'viewBox="\S+ \S+ (\S+) [^"]*"')
-NAME, REFERENCE = re.compile(r' id="([^"]*)"'), re.compile(r'(?:url\(#|href="#)([^)"]+)')
+IDENTIFIER, REFERENCE = re.compile(r' id="([^"]*)"'), re.compile(r'(?:url\(#|href="#)([^)"]+)')
 
 
 @contextmanager
@@ -153,9 +161,108 @@ def inline(svg: str, words: str) -> str:
     """An SVG file as an element of a page; ``words`` are for readers who cannot see it. Names that nothing refers to are dropped."""
     bare = FILE_ONLY.sub("", svg)
     used = set(REFERENCE.findall(bare))
-    bare = NAME.sub(lambda name: name[0] if name[1] in used else "", bare)
+    bare = IDENTIFIER.sub(lambda name: name[0] if name[1] in used else "", bare)
     view = VIEW.search(bare)
     box, width = (view[0], view[1]) if view else ("", "480")
     look = f'class="picture" style="max-width: {width}pt; stroke-linejoin: round; stroke-linecap: butt"'
     opening = f'<svg {box} {look} role="img" aria-label="{escape(words)}">'
     return OPENING.sub(lambda _: opening, bare, count=1).replace("xlink:href", "href")
+
+
+REPORT = "report.html"
+# Files that ``with_report`` adds to those of a command.
+REPORT_FILES = (REPORT, NAME)
+# Rows from which a table is folded.
+LONG = 40
+
+
+def write_with_report(
+    folder: OutputFolder,
+    identity: Identity | None,
+    blocks: Callable[[], Sequence[Block]],
+    write: Callable[[Path], Sequence[str]],
+) -> list[str]:
+    """Write ``with_report`` into the folder of a command, without an identity the files alone; names of the files, none without
+    a folder. Raises OSError.
+    """
+    if folder.path is None:
+        return []
+    return folder.write(lambda stage: with_report(stage, identity, blocks, write) if identity else [*write(stage)])
+
+
+def with_report(
+    folder: Path,
+    identity: Identity,
+    blocks: Callable[[], Sequence[Block]],
+    write: Callable[[Path], Sequence[str]],
+    prefix: str = "",
+) -> list[str]:
+    """Let ``write`` write the files of a command into ``folder``, then report.html with its pictures and tables.xlsx.
+
+    blocks : makes the blocks of the terminal
+    write : writes the files and returns their names, which are returned with the two further ones
+    prefix : before these two names, where the folder has others that must stay. Raises OSError.
+    """
+    with vector_copies() as pictures:
+        names = list(write(folder))
+    report, workbook = f"{prefix}{REPORT}", f"{prefix}{NAME}"
+    (folder / report).write_text(result_page(identity, blocks(), pictures), encoding="utf-8")
+    write_workbook(folder / workbook, [folder / name for name in names if name.endswith(".csv")], identity)
+    return [*names, report, workbook]
+
+
+def page(
+    title: str,
+    heading: str,
+    sections: Iterable[Section],
+    widget: Callable[[str], str] = lambda name: "",
+    notice: str = "",
+    scripts: str = "",
+) -> str:
+    """A whole page.
+
+    title, heading : name of the window, and the first heading
+    widget : writes the place of a named interactive picture
+    notice, scripts : HTML before the sections, and after them
+    """
+    chapters = list(sections)
+    marks = {
+        "TITLE": escape(title),
+        "HEADING": escape(heading),
+        "STYLE": _text("report.css"),
+        "CONTENTS": "".join(f'<li><a href="#{part.key}">{escape(part.title)}</a></li>' for part in chapters),
+        "NOTICE": notice,
+        "SECTIONS": "\n".join(section(part, widget) for part in chapters),
+        "SCRIPTS": scripts,
+    }
+    return filled_page(_text("page.html"), marks)
+
+
+def result_page(identity: Identity, blocks: Sequence[Block], pictures: Mapping[str, str]) -> str:
+    """Page of a result: its verdict, its blocks at every detail with long tables folded, its pictures (SVG by name), its identity."""
+    opening = "".join(render(block) for block in blocks if isinstance(block, Verdict) and has_content(block))
+    blocks = [_folded(block) for block in blocks if not isinstance(block, Verdict)]
+    drawn = [Figures([picture], name) for name, picture in pictures.items()]
+    parts = [
+        Section("result", "Result", [identity_line(identity), *blocks]),
+        Section("pictures", "Pictures", drawn),
+        identity_section(identity),
+    ]
+    return page(identity.title, identity.title, [part for part in parts if part.blocks], notice=opening)
+
+
+def _folded(block: Block) -> Block:
+    """A long table folded below its caption; any other block as it is."""
+    if isinstance(block, Table) and block.caption and len(block.rows) > LONG:
+        return replace(block, folded=True)
+    return block
+
+
+def identity_section(identity: Identity) -> Section:
+    """Section of a page: bearing, operating point, date, version, hashes of the input files."""
+    return Section("identity", "Bearing, operating point, inputs", [replace(identity_table(identity), caption="")])
+
+
+def _text(name: str) -> str:
+    """A file of the page."""
+    return files("rbdyn.base").joinpath(name).read_text(encoding="utf-8")

@@ -13,8 +13,8 @@ from rbdyn.base.blocks import Block, Detail, Paragraph, Table, with_notes
 from rbdyn.base.command import Console, Delivery, result_command
 from rbdyn.base.faults import InputError, assignment_faults, axis_values, key_path, refuse
 from rbdyn.base.folder import output_folder
+from rbdyn.base.html import REPORT_FILES
 from rbdyn.base.identity import identity_of
-from rbdyn.base.page import REPORT_FILES
 from rbdyn.base.terminal import show as show_blocks
 from rbdyn.base.words import counted, label
 from rbdyn.cli.ball import ball

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from rbdyn.base.command import Console, Delivery, SceneFile, Set, alarm, result_command, valued
 from rbdyn.base.faults import InputError
+from rbdyn.base.html import REPORT_FILES
 from rbdyn.base.identity import identity_of
 from rbdyn.base.notes import status_notes
-from rbdyn.base.page import REPORT_FILES
 from rbdyn.scene import BallScene, Scene, balls_only
 
 if TYPE_CHECKING:

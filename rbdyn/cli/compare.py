@@ -11,8 +11,8 @@ import typer
 from rbdyn.base import command
 from rbdyn.base.blocks import Block, Detail, Paragraph, Table, with_notes
 from rbdyn.base.command import Console, Delivery, result_command
+from rbdyn.base.html import REPORT_FILES
 from rbdyn.base.identity import Identity, identity_of
-from rbdyn.base.page import REPORT_FILES
 from rbdyn.base.words import counted, improvement, quantity
 
 if TYPE_CHECKING:

@@ -29,10 +29,9 @@ from rbdyn.scene.fits import mounted_of, row_change
 from rbdyn.scene.operation import raceway_radii
 from rbdyn.scene.thermal import Temperatures, Thermal, oil_ceiling, part_temperatures
 from rbdyn.thermal import start as warming
-from rbdyn.thermal.conductances import cavity_volume
 from rbdyn.thermal.fixed_point import Search
 from rbdyn.thermal.losses import HOTTEST
-from rbdyn.thermal.network import INNER, NODES, OIL, OUTER
+from rbdyn.thermal.network import INNER, NODES, OIL, OUTER, cavity_volume
 
 # Figures whose largest value counts.
 AXIAL = "axial_load_N"

@@ -39,10 +39,18 @@ from rbdyn.scene.input_ranges import input_ranges
 from rbdyn.scene.notes import heat_notes
 from rbdyn.scene.operation import raceway_radii
 from rbdyn.scene.thermal import Temperatures, Thermal, inlet_temperature, oil_ceiling, over_ceiling, part_temperatures
-from rbdyn.thermal.conductances import half_space_contact, surface_coefficient
 from rbdyn.thermal.fixed_point import Search, State, model_of, steady_state
 from rbdyn.thermal.losses import TERMS, Effusivities, HeatModel, Losses, gain, log_viscosity, no_residue, shares
-from rbdyn.thermal.network import NODES, OIL, Boundaries, Conductances, carried_off, temperatures
+from rbdyn.thermal.network import (
+    NODES,
+    OIL,
+    Boundaries,
+    Conductances,
+    carried_off,
+    half_space_contact,
+    surface_coefficient,
+    temperatures,
+)
 
 # Series of SKF's table 3a by the diameter series of ISO 15.
 SERIES = {"8": "618", "9": "619", "0": "60", "2": "62", "3": "63", "4": "64"}

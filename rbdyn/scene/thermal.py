@@ -240,7 +240,7 @@ class Thermal(Sparse):
 
     def ways_out(self, lubricant: Lubricant, oil: "Oil", mounting: Mounting, width: float) -> dict[str, float]:
         """Conductances to the oil stream and the surroundings by name [W/K], of a bearing with rings of a ``width`` [m]."""
-        from rbdyn.thermal.conductances import oil_flow, seats, sump
+        from rbdyn.thermal.network import oil_flow, seats, sump
 
         housing, shaft = seats(mounting.bore, mounting.outside_diameter, width)
         flow, bath = lubricant.oil_flow, lubricant.supply == "bath"

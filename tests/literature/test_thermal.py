@@ -11,8 +11,19 @@ from rbdyn.life.rollers import iso_15312_heat
 from rbdyn.properties.catalogue import envelope, read_designation
 from rbdyn.properties.materials import ABSOLUTE_ZERO_C, MATERIALS, mil_l_23699, oil_at
 from rbdyn.scene.thermal import Thermal
-from rbdyn.thermal.conductances import cavity_volume, half_space_contact, oil_flow, seats, surface_coefficient
-from rbdyn.thermal.network import OIL, OUTER, Boundaries, Conductances, carried_off, temperatures
+from rbdyn.thermal.network import (
+    OIL,
+    OUTER,
+    Boundaries,
+    Conductances,
+    carried_off,
+    cavity_volume,
+    half_space_contact,
+    oil_flow,
+    seats,
+    surface_coefficient,
+    temperatures,
+)
 from rbdyn.thermal.oil_fraction import CM3_PER_MINUTE, oil_fraction, residence
 
 RPM = math.pi / 30.0

@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 
 from rbdyn.base.blocks import Detail, Table
+from rbdyn.base.html import result_page
 from rbdyn.base.identity import identity_of
-from rbdyn.base.page import result_page
 from rbdyn.base.terminal import text
 from rbdyn.base.words import shown
 from rbdyn.cli.simulation_output import blocks

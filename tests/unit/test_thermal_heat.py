@@ -14,9 +14,8 @@ from rbdyn.losses import POWER_TERMS
 from rbdyn.properties.catalogue import envelope, read_designation
 from rbdyn.properties.materials import MATERIALS, oil_at
 from rbdyn.scene.bearing import CustomMaterial, material_of
-from rbdyn.thermal.conductances import CageSize, cavity_volume, half_space_contact, race_contact, seats, surfaces
 from rbdyn.thermal.losses import TERMS, Effusivities, heat_partition, shares
-from rbdyn.thermal.network import NODES
+from rbdyn.thermal.network import NODES, CageSize, cavity_volume, half_space_contact, race_contact, seats, surfaces
 from rbdyn.thermal.oil_fraction import CM3_PER_MINUTE, fraction_notes, oil_fraction, residence
 
 RPM = math.pi / 30.0

@@ -24,8 +24,8 @@ from doe.workflow.identification import (
 )
 from rbdyn.base.blocks import Block, Bullets, Column, Paragraph, Sheet, with_notes
 from rbdyn.base.files import digest_of, intact, read_json, sign, write_json
+from rbdyn.base.html import REPORT, with_report
 from rbdyn.base.identity import Identity
-from rbdyn.base.page import REPORT, with_report
 from rbdyn.base.tables.sheet import text_of
 from rbdyn.base.words import NORMAL, counted, duration, quantity, shown
 from rbdyn.base.workbook import NAME as WORKBOOK

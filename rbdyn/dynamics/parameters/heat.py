@@ -18,9 +18,21 @@ from rbdyn.losses import INNER_ROLLING, LOSSES, POWER_TERMS, POWERS, ROLLING
 from rbdyn.scene import Scene
 from rbdyn.scene.notes import catalogue_entry
 from rbdyn.scene.thermal import Thermal, inlet_temperature
-from rbdyn.thermal.conductances import CageSize, cavity_volume, race_contact, surface_coefficient, surfaces
 from rbdyn.thermal.losses import GUIDES, TERMS, Effusivities, HeatModel, Losses, no_residue, shares
-from rbdyn.thermal.network import NODES, OIL, ROLLERS, Boundaries, Conductances, matrix, source
+from rbdyn.thermal.network import (
+    NODES,
+    OIL,
+    ROLLERS,
+    Boundaries,
+    CageSize,
+    Conductances,
+    cavity_volume,
+    matrix,
+    race_contact,
+    source,
+    surface_coefficient,
+    surfaces,
+)
 from rbdyn.thermal.oil_fraction import fraction_notes, residence
 
 
