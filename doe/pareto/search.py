@@ -343,6 +343,7 @@ class Goals:
 Rule = Literal["knee", "desirability", "weights"]
 
 RULES: tuple[Rule, ...] = get_args(Rule)
+CONCESSION = 0.05  # ranges of a cost that picks may lose beyond what no point avoids, where none dominates the baseline
 AUGMENTATION = 1e-3  # share of the sum in the Tchebycheff distance: distinguishes points of equal maximum
 NAMES = {"knee": "the knee", "desirability": "the most desirable", "weights": "the best by the weights"}
 
@@ -408,10 +409,22 @@ def thinning(costs: Array, goals: Goals, baseline: Array | None, keep: int, requ
     return Thinning(rows, {rule: int(np.searchsorted(rows, row)) for rule, row in picks.items()}, among)
 
 
+def loss_against(costs: Array, baseline: Array) -> Array:
+    """Largest loss (n,) of front points (n, q) against the baseline (q,), in ranges of the costs on the front.
+
+    Where the front does not reach the baseline, a loss counts from the best of the front: what no point avoids decides nothing.
+    """
+    ideal, nadir = costs.min(axis=0), costs.max(axis=0)
+    beyond = normalised(costs, ideal, nadir) - normalised(np.maximum(baseline, ideal), ideal, nadir)
+    return beyond.max(axis=1).clip(0.0)
+
+
 def pick_all(costs: Array, goals: Goals, baseline: Array | None) -> tuple[dict[Rule, int], str]:
     """The pick of every rule among the points that dominate the baseline, and the set of these points in words.
 
-    Without a baseline, or where no point dominates it, all points are candidates.
+    Where none dominates it, the candidates are the points whose `loss_against` the baseline is at most `CONCESSION` above the
+    least. A miss by a hair then moves the picks little: they do not go to the knee of the whole front. Without a baseline all
+    points are candidates.
     """
     rows = np.arange(len(costs))
     if baseline is None:
@@ -420,6 +433,10 @@ def pick_all(costs: Array, goals: Goals, baseline: Array | None) -> tuple[dict[R
         rows = np.flatnonzero(dominates(costs, baseline))
         among = f"among the {rows.size} (of {len(costs)}) front points that beat the baseline in every response"
         if rows.size == 0:
-            rows = np.arange(len(costs))
-            among = "of the front; no point of the front beats the baseline in every response"
+            loss = loss_against(costs, baseline)
+            rows = np.flatnonzero(loss <= loss.min() + CONCESSION)
+            among = (
+                f"among the {rows.size} (of {len(costs)}) front points that lose least against the baseline; "
+                "no point beats it in every response"
+            )
     return {rule: int(rows[score(rule, costs, goals)[rows].argmax()]) for rule in RULES}, among

@@ -1,18 +1,16 @@
 """What the commands hand out on small runs, against what is kept: to the letter on its platform, elsewhere keys, headers and words."""
 
-import json
-
 import pytest
 from outputs import FOLDER, OUTPUTS, form_of, handed_out, kept
-from regenerate import this_platform
+from regenerate import PLATFORMS, platforms, this_platform
 
-PLATFORM = FOLDER / "platform.json"
 CASES = [pytest.param(case, marks=[pytest.mark.slow] * output.slow) for case, output in OUTPUTS.items()]
 
 
 def test_golden_every_output_is_kept():
-    """Golden: there is a folder for each case and no other."""
-    assert {path.name for path in FOLDER.iterdir()} == {*OUTPUTS, PLATFORM.name}
+    """Golden: there is a folder for each case and no other, and its platform is known."""
+    assert {path.name for path in FOLDER.iterdir()} == {*OUTPUTS, PLATFORMS.name}
+    assert platforms().keys() == OUTPUTS.keys()
 
 
 @pytest.mark.parametrize("case", CASES)
@@ -20,7 +18,7 @@ def test_golden_outputs(case):
     """Golden: a change on purpose is kept by ``python tests/golden/regenerate.py CASE``, and its difference read."""
     found, before = handed_out(case), kept(case)
     assert found.keys() == before.keys()
-    alike = this_platform() == json.loads(PLATFORM.read_text("utf-8"))
+    alike = this_platform() == platforms()[case]
     for name, text in found.items():
         if alike:
             assert text.splitlines() == before[name].splitlines(), f"{case}/{name}"

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from doe.pareto import front, hypervolume, knee_depth, non_dominated
-from doe.pareto.search import growth
+from doe.pareto.search import CONCESSION, RULES, Goals, growth, loss_against, pick_all
 
 CORNERS = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
 LOWER, UPPER = [-1.0] * 3, [2.0] * 3
@@ -103,7 +103,35 @@ def test_pick_is_the_knee_without_a_baseline_or_above_it(three):
     assert "without a baseline" in three.pick_reason
     best = front(bowls(2), LOWER, UPPER, population=20, generations=10, baseline=[0.5, 0.0, 0.0])
     assert best.pick == best.knee
-    assert "no point of the front beats the baseline" in best.pick_reason
+    assert "no point beats it in every response" in best.pick_reason
+
+
+def quarter(count):
+    """Costs of the exact front f2 = (1 - sqrt(f1))^2, evenly along the line between the bottoms."""
+    return bowls(2)(np.linspace(0, 1, count)[:, None] * [1.0, 0.0, 0.0])
+
+
+@pytest.mark.parametrize("share", [0.1, 0.25, 0.5, 0.75, 0.9])
+def test_a_baseline_that_the_front_just_misses_loses_no_more_than_the_concession(share):
+    """The knee lies at 0.5: with a baseline elsewhere on the front, it would lose up to 0.16 of a range."""
+    costs, goals = quarter(2001), Goals.of(["min", "min"])
+    on_front = np.array([share**2, (1 - share) ** 2])
+    just_within, just_beyond = (pick_all(costs, goals, on_front + shift)[0] for shift in (1e-6, -1e-6))
+    for rule in RULES:
+        assert (costs[just_within[rule]] <= on_front + 1e-6).all()
+        lost = costs[just_beyond[rule]] - on_front
+        assert lost.max() <= CONCESSION + 1e-3
+        # A convex front gives at least as much as it takes; at the knee itself nothing is to be had.
+        assert -lost.min() >= lost.max() or share == 0.5
+
+
+def test_what_no_point_avoids_decides_nothing():
+    """Where the front does not reach the baseline in one response, the others are still judged."""
+    costs = np.array([[0.0, 1.0], [0.5, 0.5], [1.0, 0.0]])
+    assert loss_against(costs, np.array([-9.0, 0.4])) == pytest.approx([0.6, 0.5, 1.0])
+    assert loss_against(costs, np.array([0.6, 9.0])) == pytest.approx([0.0, 0.0, 0.4])
+    level = np.column_stack([costs, np.full(3, 7.0)])
+    assert loss_against(level, np.array([0.6, 9.0, 1.0])) == pytest.approx([0.0, 0.0, 0.4])
 
 
 def test_knee_of_two_bowls_is_halfway(two):
