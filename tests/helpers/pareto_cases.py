@@ -23,20 +23,6 @@ def bowls(count):
     return lambda points: ((points[:, None, :] - CORNERS[None, :count]) ** 2).sum(axis=2)
 
 
-def noisy_bowls(seed, noise, failing=False):
-    """Runs of two bowls with normal noise and its true standard error, each row a run of its own."""
-    random = np.random.default_rng(seed)
-
-    def run(points):
-        values = bowls(2)(points)
-        values = values + noise * random.standard_normal(values.shape)
-        if failing:
-            values[points[:, 2] > 0.5] = np.nan
-        return values, np.full(values.shape, noise)
-
-    return run
-
-
 def edited_study(folder, *replacements):
     """The example study with a small search, without tolerances but of the pocket, and replaced text; in ``folder``."""
     text = with_paper_goals((EXAMPLES / "clearance_study.toml").read_text(encoding="utf-8"))

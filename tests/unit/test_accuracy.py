@@ -4,16 +4,13 @@ from __future__ import annotations
 
 import json
 
-import numpy as np
 import pytest
-import replication
 import slicing
 from conftest import lacking
 
 from rbdyn import accuracy
 from rbdyn.accuracy import methods, tolerances
-from rbdyn.base.faults import InputError, RunError
-from rbdyn.dynamics.statistics.batch_means import student_half_width
+from rbdyn.base.faults import RunError
 from rbdyn.plots.style import SMALLEST_BIAS
 
 EXAMPLE = "examples/cylindrical_roller.toml"
@@ -79,51 +76,6 @@ def test_rate_load_of_slices_converges(make_scene):
     errors = slicing.load_errors(scene, (5, 15, 31, 121))
     assert errors[5] > errors[15] > errors[31] > errors[121]
     assert errors[31] < 0.01 and errors[121] < 0.002
-
-
-def test_unit_slices_study(everything, tmp_path):
-    """Unit: a row a number of slices, the finest the reference; a plain cylinder has nothing to study."""
-    numbers = {"turns": 2.0, "discard_turns": 1.0, "replicates": 2, "impact_window_turns": 2.0}
-    scene = everything.model_copy(update={"numerics": everything.numerics.model_copy(update=numbers)})
-    report = slicing.study(scene, counts=(31, 9))
-    assert [row["slices"] for row in report.record["rows"]] == [9, 31]
-    assert set(report.record["rows"][1]["bias"].values()) == {0.0}
-    assert accuracy.write(report, tmp_path) == ["slices.json", "slices.csv", "slices.png"]
-
-
-def test_unit_slices_of_a_cylinder_are_refused(outer):
-    """Unit: one slice is exact for it."""
-    with pytest.raises(InputError, match=r"bearing\.roller_profile = 'cylinder'"):
-        slicing.study(outer)
-
-
-def test_unit_expected_half_width_is_that_of_student():
-    """Unit: for the whole sample it is Student's interval; a quarter of a large one is twice as wide."""
-    sample = np.random.default_rng(1).normal(5.0, 1.0, 400)
-    assert replication.expected_half_width(sample, 400) == pytest.approx(student_half_width(sample) / sample.mean())
-    ratio = replication.expected_half_width(sample, 100) / replication.expected_half_width(sample, 400)
-    assert ratio == pytest.approx(2.0, rel=0.02)
-
-
-def test_rate_scatter_of_independent_turns():
-    """Rate: means of independent turns scatter by one over root of turns; copies of one turn do not."""
-    turns = (10, 20, 40, 80)
-    draws = [np.random.default_rng(seed) for seed in range(40)]
-    free = [replication.slope(turns, [10.0 + draw.normal(size=(200, n)).mean(axis=1) for n in turns]) for draw in draws]
-    assert np.mean([found.power for found in free]) == pytest.approx(-0.5, abs=0.02)
-    assert np.mean([found.as_expected for found in free]) > 0.8
-    stuck = replication.slope(turns, [10.0 + draws[0].normal(size=200) for _ in turns])
-    assert not stuck.as_expected
-
-
-def test_unit_replicates_study(outer, tmp_path):
-    """Unit: more replicates, a narrower interval and more time, from one pool."""
-    report = replication.study(outer, turns=(2.0, 4.0), pool=4)
-    rows = report.record["rows"]
-    assert [(row["replicates"], row["turns"]) for row in rows] == [(2, 2.0), (4, 2.0), (2, 4.0), (4, 4.0)]
-    assert rows[1]["cpu_s"] == pytest.approx(2.0 * rows[0]["cpu_s"])
-    assert all(rows[1]["half_width"][name] < rows[0]["half_width"][name] for name in tolerances.OUTPUTS)
-    assert accuracy.write(report, tmp_path) == ["replicates.json", "replicates.csv", "replicates.png"]
 
 
 def test_command_accuracy(command, tmp_path, monkeypatch):

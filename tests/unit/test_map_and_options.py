@@ -9,7 +9,6 @@ import sys
 import time
 from pathlib import Path
 
-import footprint
 import numpy as np
 import pytest
 from conftest import lacking
@@ -282,15 +281,3 @@ def test_unit_option_costs(outer, tmp_path):
     assert found.record["format"] == "rbdyn.options/1"
     saved = found.record["options"][0]
     assert saved["option"] == row.option and saved["with_ns"] > 0.0
-
-
-@pytest.mark.slow
-def test_unit_footprint_of_options(outer):
-    """Unit: an option of the plain scene's law types holds what that does; a clock adds its number, modules and code."""
-    options = {name: OPTIONS[name] for name in ("contact law of ISO/TS 16281", "rotating load, with clock")}
-    report = footprint.study(outer, options=options)
-    plain, alike, clocked = report.record["options"]
-    assert plain["state"] == 60 and plain["instructions"] > 1000 and plain["modules"] == ""
-    assert alike == {**plain, "option": "contact law of ISO/TS 16281"}
-    assert clocked["state"] == 63 and clocked["instructions"] > plain["instructions"]
-    assert "rbdyn.dynamics.forces.schedule" in clocked["modules"].split()

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import shlex
 import tomllib
-from datetime import date
 from pathlib import Path
 
 import measured_page as page
@@ -25,20 +24,3 @@ def test_unit_commands_name_files_and_keys_that_exist(line, monkeypatch):
     if line.startswith("rbdyn accuracy"):
         monkeypatch.setattr(page, "study", lambda *given: Report("x", {}, [], [], {}))
         page._run(line, None)
-
-
-@pytest.mark.parametrize("day", ["2026-01-31", date.today().isoformat()], ids=["past", "today"])
-def test_unit_a_part_of_another_day_says_so(tmp_path, day):
-    """Unit: a part that is not run keeps its tables with their date, and says so unless that is today's."""
-    file, block = tmp_path / "page.md", f"*Measured {day}; times include compiling; a machine.*\n\n`a command`, 1 s:\n"
-    file.write_text(f"<!-- study -->\n{block}<!-- /study -->\n", encoding="utf-8")
-    for _ in range(2):
-        page._write(
-            file, WHOLE, page.kept_blocks(file.read_text(encoding="utf-8"), [part["name"] for part in WHOLE["part"]])
-        )
-        found = file.read_text(encoding="utf-8")
-        first, _, rest = block.partition("\n")
-        why = (
-            "" if day == date.today().isoformat() else f"*Kept: not run for the page of {date.today().isoformat()}.*\n"
-        )
-        assert f"<!-- study -->\n{first}\n{why}{rest}<!-- /study -->" in found
