@@ -162,6 +162,7 @@ def offsets(shares: Array, distribution: Distribution) -> Array:
     return norm.ppf(outside + shares * (1.0 - 2.0 * outside)) / SIGMAS
 
 
+@lru_cache(maxsize=8)
 def even_offsets(count: int, factors: int, distribution: Distribution) -> Array:
     """Fixed offsets (count, factors) that fill the tolerance box evenly (Sobol points)."""
     points = qmc.Sobol(factors, scramble=False).random(count)
@@ -259,6 +260,8 @@ class ToleranceBox:
         """Robust costs (n, q) and violations (n, c) from the responses (n, s, m) of parts, of the worst part or a quantile."""
         share = 1.0 if self.kind == "worst_case" else self.quantile
         costs = np.quantile(goals.costs(values), share, axis=1)
+        if not goals.limited:
+            return Judged(costs, np.zeros((*costs.shape[:-1], 0)))
         low, high = (np.quantile(values, side, axis=1) for side in (1.0 - share, share))
         return Judged(costs, goals.violations(low - below, high + above))
 
@@ -343,8 +346,8 @@ def tolerance_aware_front(
     low, high = lower + box.half, upper - box.half
     check_search(low, high, population, generations, keep)
     judge = partial(box.judge, surfaces, goals)
-    history = search(barring(partial(judge, doubt=doubt), barred), low, high, population, generations, seed).archives
-    points, costs = history[-1]
+    searched = search(barring(partial(judge, doubt=doubt), barred), low, high, population, generations, seed)
+    points, costs = searched.archive
     nominal_baseline = goals.costs(_nominal(surfaces, baseline[None]))[0]
     baseline_costs = judge(baseline[None]).costs[0]
     survives_nominal = bool(dominates(costs, nominal_baseline).any())

@@ -23,6 +23,7 @@ from typing import Any, Literal, NamedTuple, Self, get_args
 import numpy as np
 from scipy.stats import qmc
 
+from doe.pareto.evolution import evolve
 from rbdyn.base.arrays import Array, Mask, Rows
 from rbdyn.base.faults import MethodError
 
@@ -100,9 +101,13 @@ def dominates(better: Array, worse: Array) -> Mask:
 
 def merge(archive: Archive, new: Archive) -> Archive:
     """Non-dominated points of both."""
-    points, costs = np.vstack([archive.points, new.points]), np.vstack([archive.costs, new.costs])
-    rows = non_dominated(costs)
-    return Archive(points[rows], costs[rows])
+    return non_dominated_points(Archive(*map(np.vstack, zip(archive, new, strict=True))))
+
+
+def non_dominated_points(archive: Archive) -> Archive:
+    """Those points that no other one dominates."""
+    rows = non_dominated(archive.costs)
+    return Archive(archive.points[rows], archive.costs[rows])
 
 
 def spread(costs: Array, keep: int, required: Sequence[int] = ()) -> Rows:
@@ -188,19 +193,30 @@ class InfeasibleError(MethodError):
 
 
 class Search(NamedTuple):
-    """Archive after every generation, number of evaluations, and share of feasible ones."""
+    """Points that keep all limits, by generation; number of evaluations, and share of these that keep the limits."""
 
-    archives: list[Archive]
+    generations: list[Archive]
     evaluations: int
     feasible: float
 
+    @property
+    def archive(self) -> Archive:
+        """Non-dominated points of all generations."""
+        return non_dominated_points(Archive(*map(np.vstack, zip(*self.generations, strict=True))))
+
+    @property
+    def archives(self) -> list[Archive]:
+        """The archive after every generation."""
+        none = Archive(*(part[:0] for part in self.generations[0]))
+        return list(accumulate(self.generations, merge, initial=none))[1:]
+
 
 def search(judge: Judge, low: Array, high: Array, population: int, generations: int, seed: int) -> Search:
-    """NSGA-II over a box, with the archive of all evaluations after every generation.
+    """NSGA-II over a box.
 
     Raises InfeasibleError when no evaluated point keeps all limits.
     """
-    history = _evolve(judge, low, high, population, generations, seed)
+    history = _evolved(judge, low, high, population, generations, seed)
     allowed = [(judged.violations <= 0.0).all(axis=1) for _, judged in history]
     count = sum(len(points) for points, _ in history)
     if not any(rows.any() for rows in allowed):
@@ -209,8 +225,7 @@ def search(judge: Judge, low: Array, high: Array, population: int, generations: 
         closest = (violations / _scale(violations)).sum(axis=1).argmin()
         raise InfeasibleError(points[closest], violations[closest])
     good = [Archive(points[rows], judged.costs[rows]) for (points, judged), rows in zip(history, allowed, strict=True)]
-    archives = accumulate(good, merge, initial=Archive(*(part[:0] for part in good[0])))
-    return Search(list(archives)[1:], count, sum(int(rows.sum()) for rows in allowed) / count)
+    return Search(good, count, sum(int(rows.sum()) for rows in allowed) / count)
 
 
 def check_search(low: Array, high: Array, population: int, generations: int, keep: int) -> None:
@@ -234,27 +249,18 @@ def _scale(violations: Array) -> Array:
     return np.where(largest > 0.0, largest, 1.0)
 
 
-def _evolve(judge: Judge, low: Array, high: Array, population: int, generations: int, seed: int) -> History:
-    from pymoo.algorithms.moo.nsga2 import NSGA2
-    from pymoo.core.problem import Problem
-    from pymoo.optimize import minimize
-
+def _evolved(judge: Judge, low: Array, high: Array, population: int, generations: int, seed: int) -> History:
     history: History = []
     # The scale of the violations comes from points all over the box.
     sample = judge(np.random.default_rng(seed).uniform(low, high, (population, low.size)))
     scale = _scale(sample.violations)
 
-    class Recorded(Problem):
-        def _evaluate(self, x: Array, out: dict[str, Array]) -> None:
-            judged = judge(x)
-            out["F"] = judged.costs
-            if scale.size:
-                out["G"] = judged.violations / scale
-            history.append((x.copy(), Judged(judged.costs.copy(), judged.violations.copy())))
+    def evaluate(points: Array) -> tuple[Array, Array]:
+        judged = judge(points)
+        history.append((points, judged))
+        return judged.costs, np.maximum(judged.violations / scale, 0.0).sum(axis=1)
 
-    count = sample.costs.shape[1]
-    problem = Recorded(n_var=low.size, n_obj=count, n_ieq_constr=scale.size, xl=low, xu=high)
-    minimize(problem, NSGA2(pop_size=population), ("n_gen", generations), seed=seed)
+    evolve(evaluate, low, high, population, generations, seed)
     return history
 
 
