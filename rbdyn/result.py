@@ -10,7 +10,7 @@ from rbdyn.base.blocks import Column, Sheet, columns_of, within
 from rbdyn.base.files import read_record, write_json
 from rbdyn.base.notes import Note, Notes
 from rbdyn.base.records import Record, derived, keyed, nullable, shown, spread, written
-from rbdyn.base.words import Brief, Figure, counted, error_alone, quantity, value_alone
+from rbdyn.base.words import Brief, Figure, counted, error_alone, quantity, value_alone, with_error
 from rbdyn.clearances import DIFFERENCE
 from rbdyn.verdict.orbits import CageVerdict
 
@@ -62,6 +62,11 @@ class Quantity(Record):
         An error of the time steps alone says nothing of a figure that scatters.
         """
         return None if self.statistical_error is None else self.error
+
+    @property
+    def text(self) -> str:
+        """The value with its stated error."""
+        return with_error(self.value, self.stated_error)
 
     @property
     def value_text(self) -> str:

@@ -54,18 +54,15 @@ def html_report(summary: Summary, motion: Motions = MappingProxyType({})) -> str
     data = f'<script type="application/json" id="data">{_json(page_data(summary, motion))}</script>'
     scripts = [data, *(f"<script>\n{script}</script>" for script in _scripts(widgets))]
     opening = "".join(map(html.render, readable([Verdict(tuple(summary.notes))], summary.asked)))
-    return page(window_title(summary), title(summary), chapters, _widget, NO_SCRIPTS + opening, "\n".join(scripts))
+    window = f"{title(summary)}: {summary.identity.title}"
+    document = NO_SCRIPTS + opening
+    return page(window, title(summary), chapters, lambda name: text(f"{name}.html"), document, "\n".join(scripts))
 
 
 def title(summary: Summary) -> str:
     """The name of the file of the study in words."""
     stem = PurePath(summary.asked.study_file).stem.replace("_", " ")
     return stem[:1].upper() + stem[1:]
-
-
-def window_title(summary: Summary) -> str:
-    """The title of the study with its bearing and the command."""
-    return f"{title(summary)}: {summary.identity.title}"
 
 
 def sections(summary: Summary, motion: Motions = MappingProxyType({})) -> list[Section]:
@@ -95,11 +92,6 @@ def sections(summary: Summary, motion: Motions = MappingProxyType({})) -> list[S
 def text(name: str) -> str:
     """A file of the page."""
     return files("doe.report").joinpath("html", name).read_text(encoding="utf-8")
-
-
-def _widget(name: str) -> str:
-    """Controls of an interactive picture."""
-    return text(f"{name}.html")
 
 
 def _scripts(widgets: set[str]) -> list[str]:

@@ -14,7 +14,7 @@ from doe.pareto.manufacture import Interval, percent
 from doe.response_surface.adequacy import probability
 from doe.response_surface.statistics import Fits
 from doe.running.store import Cause
-from doe.workflow.confirmation import ConfirmedPoint, Gain, PickLimit
+from doe.workflow.confirmation import ConfirmedPoint, Gain, PickLimit, point_words
 from doe.workflow.duty import DutyAnswer
 from doe.workflow.front_record import EstimatedPoint, SearchResult, SurfaceFront
 from doe.workflow.judgement import Robust
@@ -25,7 +25,7 @@ from doe.workflow.problem import Asked, Settings
 from doe.workflow.runs import StudyDesign
 from doe.workflow.surfaces import PredictedGain, PublishedComparison
 from doe.workflow.tolerances import FactorTolerance, KeptGain
-from rbdyn.base.blocks import Block, Bullets, Figures, Heading, Paragraph, Remarks, Table, Verdict, has_content
+from rbdyn.base.blocks import Block, Bullets, Detail, Figures, Heading, Paragraph, Remarks, Table, Verdict, has_content
 from rbdyn.base.identity import Identity
 from rbdyn.base.notes import Note
 from rbdyn.base.records import Record
@@ -104,6 +104,26 @@ def record_table(caption: str, record: Mapping[str, Any] | None, folded: bool = 
     rows = list(scalars(record or {}))
     prose = (1,) if any(len(value) > LONG for _, value in rows) else ()
     return Table(caption, ("", "value"), rows, folded=folded, text_columns=prose)
+
+
+def by_point(
+    caption: str,
+    asked: Asked,
+    points: Mapping[str, Any],
+    cell: Callable[[Any, str], str],
+    detail: Detail = Detail.LEAST,
+    further: int = 0,
+) -> Table:
+    """A row a point, which has ``factors``, and a ``cell`` for each response; ``further`` decimals of factors beyond the drawing's."""
+    rows = [
+        [
+            point_words(name),
+            *(factor.text(point.factors[factor.name], further) for factor in asked.factors),
+            *(cell(point, response) for response in asked.names),
+        ]
+        for name, point in points.items()
+    ]
+    return Table(caption, ["point", *map(label, asked.columns), *map(label, asked.names)], rows, detail=detail)
 
 
 def nearest(asked: Asked, place: Mapping[str, float], candidates: Mapping[str, Mapping[str, float]]) -> str:

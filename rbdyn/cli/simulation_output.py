@@ -204,26 +204,25 @@ def _temperatures(result: SimulationResult) -> list[Block]:
     if balance is None or figures is None:
         return []
     ranges = balance.ranges.figures or {}
-    rows = [
-        (
-            NODE_NAMES[node],
-            # Where the inputs leave kelvins open, hundredths say nothing.
-            value_alone(figure.value, 0.5 * (ranges[node][-1] - ranges[node][0]))
-            if node in ranges
-            else figure.value_text,
-            range_ends(ranges[node]) if node in ranges else "",
-            "" if figure.statistical_error is None else _error(figure.statistical_error),
-            "" if figure.numerical_error is None else _error(figure.numerical_error),
-            f"{balance.heat_W[node]:.3g}",
-        )
-        for node, figure in figures.items()
-    ]
-    header = ("temperature [°C]", "value", "inputs (90 %)", "statistical (95 %)", "numerical (95 %)", "heat [W]")
+
+    def value(row: tuple[str, Quantity]) -> str:
+        # Where the inputs leave kelvins open, hundredths say nothing.
+        node, figure = row
+        return value_alone(figure.value, 0.5 * (ranges[node][-1] - ranges[node][0])) if ranges else figure.value_text
+
+    columns: tuple[Column[tuple[str, Quantity]], ...] = (
+        Column("", words="temperature [°C]", cell=lambda row: NODE_NAMES[row[0]]),
+        Column("value", cell=value),
+        Column("", words="inputs (90 %)", cell=lambda row: range_ends(ranges[row[0]]) if ranges else ""),
+        Column("", error_alone, "statistical (95 %)", at=(1, "statistical_error")),
+        Column("", error_alone, "numerical (95 %)", at=(1, "numerical_error")),
+        Column("", words="heat [W]", cell=lambda row: f"{balance.heat_W[row[0]]:.3g}"),
+    )
     ways = ", ".join(f"{way} {power:.3g} W" for way, power in balance.carried_off_W.items() if power)
     state = "steady state" if balance.status == "steady" else balance.status
     inputs = ", ".join(balance.ranges.inputs or ())
     return [
-        Table("", header, rows),
+        Sheet("", columns, list(figures.items())).block,
         Paragraph(f"{state}; thermal loop gain {balance.gain:+.2f}; removed: {ways}"),
         *([Paragraph(other_ranges(ranges))] if ranges else []),
         *([Paragraph(f"inputs that vary: {inputs}", detail=Detail.ALL)] if inputs else []),
@@ -283,8 +282,7 @@ def _start_sentence(start: StartResult) -> str:
     lost = start.radial_um.least.value <= 0.0 and start.race_pressure_MPa is not None
     pressure = f"; raceways reach {start.race_pressure_MPa:.0f} MPa without clearance" if lost else ""
     return (
-        f"start: inner ring up to {with_error(lead.value, lead.stated_error)} K ({range_ends(spread)}) warmer than the outer ring; "
-        f"{steady}{pressure}"
+        f"start: inner ring up to {lead.text} K ({range_ends(spread)}) warmer than the outer ring; {steady}{pressure}"
     )
 
 
@@ -370,7 +368,7 @@ def _losses(result: SimulationResult) -> list[Block]:
         (term.replace("_", " "), with_error(power, errors.get(term)), f"{100.0 * power / total:.2g} %")
         for power, term in terms
     ]
-    losses.append(("all", with_error(result.power_loss_W.value, result.power_loss_W.stated_error), "100 %"))
+    losses.append(("all", result.power_loss_W.text, "100 %"))
     losses += [
         (f"rolling resistance, {race} raceway alone", shown(power, 3), f"{100.0 * power / total:.2g} %")
         for race, power in result.rolling_resistance_W.items()
@@ -490,7 +488,7 @@ def simulated_blocks(found: "DutySimulation") -> list[Block]:
         Paragraph(f"Worst: {', '.join(_worst(name, found.worst[name]) for name in names)}." if names else ""),
         _point_table("Figures", found, SHOWN, cage_column()),
         _point_table("Clearances in operation [µm]", found, CLEARANCE_COLUMNS),
-        *_point_starts(found),
+        Sheet("On the way to the points", STARTS, [point for point in found.points if point.start]).block,
         *duty_blocks(found.points, found.life or {}),
         Paragraph("" if found.life else f"Life over the duty: unknown, because {', '.join(lifeless)} has none."),
     ]
@@ -510,22 +508,15 @@ def _point_table(
     return Sheet(caption, columns, [point for point in found.points if point.figures]).block.without_empty_columns()
 
 
-def _point_starts(found: "DutySimulation") -> list[Block]:
-    """How the machine comes to points; nothing where the duty states no state before any."""
-    rows = [
-        (
-            point.name,
-            start.origin,
-            with_error(start.radial_um.least.value, start.radial_um.least.stated_error),
-            "at an end" if start.radial_um.time_s is None else shown(start.radial_um.time_s, 3),
-            with_error(start.temperature_difference_K.value, start.temperature_difference_K.stated_error),
-            start.status,
-        )
-        for point in found.points
-        if (start := point.start) is not None
-    ]
-    header = ("point", "from", "least radial clearance [µm]", "after [s]", "inner less outer ring [K]", "then")
-    return [Table("On the way to the points", header, rows, text_columns=(1, 5))] if rows else []
+# How the machine comes to a point of a duty.
+STARTS: "tuple[Column[SimulatedPoint], ...]" = (
+    Column("name", words="point"),
+    Column("from", at=("start", "origin"), text=True),
+    Column("", words="least radial clearance [µm]", at=("start", "radial_um", "least", "text")),
+    Column("", 3, "after [s]", at=("start", "radial_um", "time_s"), missing="at an end"),
+    Column("", words="inner less outer ring [K]", at=("start", "temperature_difference_K", "text")),
+    Column("then", at=("start", "status"), text=True),
+)
 
 
 def _marked(point: "SimulatedPoint") -> str:

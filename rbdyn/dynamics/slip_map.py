@@ -73,16 +73,12 @@ def axis_value(key: str, value: float) -> str:
     return f"{value:g} {unit}" if unit else f"{words} {value:g}"
 
 
-def _key_column(key: str) -> Column[Point]:
-    return Column(key, at=lambda point: (point.at or {})[key])
-
-
 def map_sheet(points: Sequence[Point], figures: Iterable[str] = ()) -> Sheet[Point]:
     """A row a point, with its ``figures`` and their errors."""
     columns: tuple[Column[Point], ...] = (
         Column("inner_speed_rpm", meaning="operating point"),
         Column("radial_load_N"),
-        *map(_key_column, (points[0].at if points else None) or ()),
+        *(Column[Point](key, at=("at", key)) for key in (points[0].at if points else None) or ()),
         *figure_columns(figures or dict.fromkeys(name for point in points for name in point.figures)),
         cage_column(),
         Column(

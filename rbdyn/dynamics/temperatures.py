@@ -318,10 +318,6 @@ def _part(late: float, scene: Scene) -> Scene:
     return with_numerics(short(scene), **counted, replicates=scene.numerics.replicates)
 
 
-def _unchanged(scene: Scene) -> Scene:
-    return scene
-
-
 def _resumed(scene: Scene) -> Scene:
     """The scene with runs that go on from settled states."""
     return with_numerics(scene, discard_turns=min(RESUMED_TURNS, scene.numerics.warm_up_turns))
@@ -345,7 +341,7 @@ def with_temperatures(
         raise RunError(f"{verdict.status}: {verdict.reason}")
     path, temperatures, ends = verdict.path, verdict.temperatures, verdict.ends
     for _ in range(MOST_WHOLE_RUNS if verdict.steady else 1):
-        state = balance.at(temperatures, _resumed if ends else _unchanged, progress, starts=ends)
+        state = balance.at(temperatures, _resumed if ends else lambda scene: scene, progress, starts=ends)
         ends = ends and state.run.ensemble.ends
         path.append(state)
         temperatures = corrected(state, verdict.slopes)

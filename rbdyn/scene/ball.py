@@ -580,7 +580,7 @@ def _thermal_faults(scene: BallScene) -> Iterator[str]:
         if scene.mounting is None:
             yield NO_MOUNTING
     if scene.operation.inner_speed_rpm == scene.operation.outer_speed_rpm:
-        yield f"operation.inner_speed_rpm = {scene.operation.inner_speed_rpm:g}: [thermal] needs rings that turn against each other"
+        yield f"operation.inner_speed_rpm = {scene.operation.inner_speed_rpm:g}: [thermal] needs rings that turn against each other; change it"
     for key, usual in (("cage_offset_K", 0.0), ("cage_ceiling_C", None)):
         if (value := getattr(thermal, key)) != usual:
             yield f"thermal.{key} = {value:g}: the model of ball bearings has no cage; leave it out"

@@ -291,8 +291,14 @@ class Cage(Consistent):
     mass, inertia, imbalance = SI("g"), OptionalSI("kg_mm2"), SI("um")
 
     def faults(self) -> Iterator[str]:
-        if self.pocket_clearance_mm > 5.0 or (self.guide_clearance_mm or 0.0) > 5.0:
-            yield "cage: a clearance above 5 mm is implausible; give millimetres"
+        wide = {
+            key: value for key in ("pocket", "guide") if (value := getattr(self, f"{key}_clearance_mm") or 0.0) > 5.0
+        }
+        if wide:
+            yield from (
+                f"cage.{key}_clearance_mm = {value:g}: above 5 mm is implausible; give millimetres"
+                for key, value in wide.items()
+            )
         elif self.pocket_radial_clearance_mm is not None and self.guidance != "roller":
             yield (
                 f"cage.pocket_radial_clearance_mm and cage.guidance = {self.guidance!r} contradict each other: lips guide the cage "

@@ -1,7 +1,7 @@
 """Operating conditions of roller and ball bearings: speeds and loads, support of the outer ring, mounting with fits and temperatures."""
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
 from typing import Annotated, Any, ClassVar, Literal, Protocol
 
@@ -30,19 +30,21 @@ class Schedule(Consistent):
     inner_speed = InSI[list[float] | None]("rpm")
 
     def faults(self) -> Iterator[str]:
-        times = self.time_s
-        for i, (a, b) in enumerate(pairwise(times)):
-            if b <= a:
-                yield (
-                    f"operation.schedule.time_s: times must rise, but {b:g} s (point {i + 2}) follows {a:g} s; sort "
-                    "them"
-                )
-        for key in ("inner_speed_rpm", "radial_load_N"):
-            values = getattr(self, key)
-            if values is not None and len(values) != len(times):
-                yield f"operation.schedule.{key}: {counted(len(values), 'value')} for {counted(len(times), 'time')}; give one value for each time"
-        if self.inner_speed_rpm is None and self.radial_load_N is None:
-            yield "operation.schedule: has neither speed nor load; give inner_speed_rpm or radial_load_N"
+        columns = {"inner_speed_rpm": self.inner_speed_rpm, "radial_load_N": self.radial_load_N}
+        yield from schedule_faults("operation.schedule", self.time_s, columns)
+
+
+def schedule_faults(name: str, times: Sequence[float], columns: Mapping[str, Sequence[float] | None]) -> Iterator[str]:
+    """Faults of the times [s] of a schedule and of its columns of speed and load, of which it needs one."""
+    for place, (before, after) in enumerate(pairwise(times), 2):
+        if after <= before:
+            yield f"{name}.time_s: times must rise, but {after:g} s (point {place}) follows {before:g} s; sort them"
+    for key, values in columns.items():
+        if values is not None and len(values) != len(times):
+            numbers = f"{counted(len(values), 'value')} for {counted(len(times), 'time')}"
+            yield f"{name}.{key}: {numbers}; give one value for each time"
+    if all(values is None for values in columns.values()):
+        yield f"{name}: has neither speed nor load; give {' or '.join(columns)}"
 
 
 class Operation(Consistent):

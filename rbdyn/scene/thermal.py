@@ -6,15 +6,13 @@ temperatures, and its films have those of their surfaces.
 
 from collections.abc import Iterable, Iterator, Mapping
 from copy import deepcopy
-from itertools import pairwise
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NamedTuple
 
 from pydantic import Field
 
 from rbdyn.base.faults import Consistent, InputError, InSI, NonNegative, Positive, Share, Sparse, Strict
-from rbdyn.base.words import counted
 from rbdyn.scene.lubricant import HOTTEST_C, THICKEST, Lubricant, OilCelsius
-from rbdyn.scene.operation import SLOWEST_RPM, Load, Mounting
+from rbdyn.scene.operation import SLOWEST_RPM, Load, Mounting, schedule_faults
 
 if TYPE_CHECKING:
     from rbdyn.mounting.rings import MountedRings
@@ -49,21 +47,10 @@ class StartSchedule(Consistent):
         times, name = self.time_s, "thermal.start.schedule"
         if times[0] != 0.0:
             yield f"{name}.time_s: begins at {times[0]:g} s; give the speed and load of the start at 0"
-        for place, (before, after) in enumerate(pairwise(times), 2):
-            if after <= before:
-                yield f"{name}.time_s: times must rise, but {after:g} s (point {place}) follows {before:g} s; sort them"
         if times[-1] > LONGEST:
             yield f"{name}.time_s: ends after {times[-1]:g} s, more than a week ({LONGEST:g} s); give seconds"
-        for key in ("speed_rpm", "load_N"):
-            values = getattr(self, key)
-            if values is not None and len(values) != len(times):
-                yield (
-                    f"{name}.{key}: {counted(len(values), 'value')} for {counted(len(times), 'time')}; give one value for each "
-                    "time"
-                )
-        if self.speed_rpm is None and self.load_N is None:
-            yield f"{name}: has neither speed nor load; give speed_rpm or load_N"
-        elif self.speed_rpm is not None and len(self.speed_rpm) == len(times) and max(self.speed_rpm) < SLOWEST_RPM:
+        yield from schedule_faults(name, times, {"speed_rpm": self.speed_rpm, "load_N": self.load_N})
+        if self.speed_rpm is not None and len(self.speed_rpm) == len(times) and max(self.speed_rpm) < SLOWEST_RPM:
             yield f"{name}.speed_rpm: the machine stands still at every time; give a speed of at least {SLOWEST_RPM:g}"
 
 

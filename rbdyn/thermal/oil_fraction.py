@@ -36,11 +36,6 @@ def oil_fraction(volume_flow: float, speed: float, pitch_diameter: float, factor
     return min(factor * share, LARGEST)
 
 
-def speed_factor(speed: float, pitch_diameter: float) -> float:
-    """Pitch diameter times speed [mm/min], from a speed [rad/s] and a diameter [m]."""
-    return abs(speed) / RPM * 1e3 * pitch_diameter
-
-
 def residence(fraction: float, cavity: float, volume_flow: float, cage_speed: float) -> float:
     """Turns of the cage that oil stays in the free volume ``cavity`` [m^3]: X V n_c/W, at ``cage_speed`` [rad/s]."""
     return fraction * cavity * abs(cage_speed) / (2.0 * math.pi) / volume_flow
@@ -49,7 +44,7 @@ def residence(fraction: float, cavity: float, volume_flow: float, cage_speed: fl
 def fraction_notes(speed: float, pitch_diameter: float, stay: float) -> Notes:
     """Sentences where the formula is outside its range or the residence ``stay`` in cage turns is unusual."""
     notes = list[Note]()
-    fast = speed_factor(speed, pitch_diameter)
+    fast = abs(speed) / RPM * 1e3 * pitch_diameter  # [mm/min]
     if not SLOWEST <= fast <= FASTEST:
         sentence = (
             f"oil fraction: {1e-6 * fast:.2g} million mm/min is outside the {1e-6 * SLOWEST:g} to {1e-6 * FASTEST:g} million of its "

@@ -19,6 +19,7 @@ from doe.report.summary import (
     SENSES,
     SIGNS_NOTE,
     Summary,
+    by_point,
     change,
     nearest,
     share_with_interval,
@@ -351,6 +352,17 @@ def _verdict(limit: Limit) -> tuple[str, str]:
     return LIMITS[limit.verdict], "" if limit.probability is None else chance(limit.probability)
 
 
+FACTORS: tuple[Column[Factor], ...] = (
+    Column("factor", cell=lambda factor: f"{factor.letter}: {label(factor.name)}"),
+    Column("key", words="key of the scene", text=True),
+    Column("centre", cell=lambda factor: factor.text(factor.centre)),
+    Column("step"),
+    Column("region", cell=lambda factor: f"{factor.text(factor.low)} to {factor.text(factor.high)}"),
+    Column("resolution"),
+    Column("tolerance", cell=lambda factor: f"± {shown(factor.tolerance)}" if factor.tolerance else ""),
+)
+
+
 def settings(summary: Summary) -> Section:
     """Factors, responses and scene as the study states them."""
     asked = summary.asked
@@ -358,19 +370,6 @@ def settings(summary: Summary) -> Section:
         f"{shown(asked.design_replicates)} replicates per design run, {shown(asked.turns)} counted shaft turns per replicate, "
         f"{shown(asked.confirmation_replicates)} replicates per confirmed point"
     )
-    rows = [
-        (
-            f"{factor.letter}: {label(factor.name)}",
-            factor.key,
-            factor.text(factor.centre),
-            shown(factor.step),
-            f"{factor.text(factor.low)} to {factor.text(factor.high)}",
-            shown(factor.resolution),
-            f"± {shown(factor.tolerance)}" if factor.tolerance else "",
-        )
-        for factor in asked.factors
-    ]
-    header = ("factor", "key of the scene", "centre", "step", "region", "resolution", "tolerance")
     goals = [(label(response.name), *_goal(response)) for response in asked.responses]
     columns = ("response", "goal", "limits", "weight", "model")
     values = [
@@ -382,7 +381,7 @@ def settings(summary: Summary) -> Section:
     ]
     blocks: list[Block] = [
         Paragraph(f"Study {asked.study_file}, scene {asked.scene_file}; {effort}."),
-        Table("Factors", header, rows, text_columns=(1,)),
+        Sheet("Factors", FACTORS, asked.factors).block,
         Table("Responses", columns, goals, text_columns=(1, 4)),
         Table("Scene: the bearing and its operation", ("key", "value"), values, folded=True),
     ]
@@ -401,16 +400,8 @@ def _goal(response: Response) -> tuple[str, str, str, str]:
 def confirmation(summary: Summary) -> Section:
     """Simulated responses at every confirmed point compared with those that the surfaces predicted."""
     points, asked = summary.confirmation, summary.asked
-    header = ["point", *map(label, asked.columns), *map(label, asked.names)]
-    rows = [
-        [
-            point_words(name),
-            *(factor.text(point.factors[factor.name]) for factor in asked.factors),
-            *(point.responses[response].text for response in asked.names),
-        ]
-        for name, point in points.items()
-    ]
-    blocks: list[Block] = [Table("Simulated with fresh seeds (95 % intervals)", header, rows)]
+    caption = "Simulated with fresh seeds (95 % intervals)"
+    blocks: list[Block] = [by_point(caption, asked, points, lambda point, name: point.responses[name].text)]
     # The surfaces predict the gains of their own pick, which another may have overtaken.
     name = nearest(asked, summary.front.pick.factors, {name: point.factors for name, point in points.items()})
     simulated = points[name].gains or {}
@@ -433,35 +424,29 @@ def confirmation(summary: Summary) -> Section:
 
 def changes(summary: Summary) -> Table:
     """Gains over the baseline at every confirmed point that has any."""
-    asked = summary.asked
-    rows = [
-        [
-            point_words(name),
-            *(factor.text(point.factors[factor.name]) for factor in asked.factors),
-            *(signed(point.gains[response]) if response in point.gains else "" for response in asked.names),
-        ]
-        for name, point in summary.confirmation.items()
-        if point.gains
-    ]
-    caption = "Changes from the baseline at every confirmed point"
+    asked, caption = summary.asked, "Changes from the baseline at every confirmed point"
+    points = {name: point for name, point in summary.confirmation.items() if point.gains}
+    table = by_point(caption, asked, points, lambda point, name: _signed(point.gains.get(name)), Detail.ALL)
     header = ("point", *map(label, asked.columns), *(quantity(name)[0] for name in asked.names))
-    return Table(caption, header, rows, SIGNS_NOTE, detail=Detail.ALL)
+    return replace(table, header=header, note=SIGNS_NOTE)
+
+
+def _signed(gain: Gain | None) -> str:
+    return "" if gain is None else signed(gain)
+
+
+WIDTHS: tuple[Column[tuple[str, FactorTolerance]], ...] = (
+    Column("factor", label, at=0),
+    Column("tolerance", cell=lambda row: f"± {rounded_down(row[1].half_width or 0.0)}"),
+    Column("share", share_with_interval, "share of the parts (95 %)", error=(1, "interval"), at=(1, "probability")),
+    Column("grade", str, "grade of the parts, their widths", at=(1, "parts_words"), text=True),
+    Column("limited_by", label, "limited by", at=(1, "limited_by"), text=True),
+)
 
 
 def tolerances(widths: Mapping[str, FactorTolerance]) -> Table:
     """The widest tolerances that keep the gain."""
-    rows = [
-        (
-            label(name),
-            f"± {rounded_down(width.half_width or 0.0)}",
-            "" if width.probability is None else share_with_interval(width.probability, width.interval),
-            width.parts_words,
-            label(width.limited_by),
-        )
-        for name, width in widths.items()
-    ]
-    header = ("factor", "tolerance", "share of the parts (95 %)", "grade of the parts, their widths", "limited by")
-    return Table("Widest tolerances that keep the gains", header, rows, text_columns=(3, 4))
+    return Sheet("Widest tolerances that keep the gains", WIDTHS, list(widths.items())).block
 
 
 ROW = 34.0  # height of the bars of a term [pt]

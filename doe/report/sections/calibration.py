@@ -20,7 +20,6 @@ from doe.workflow.identification import (
     Evidence,
     InputAnswer,
     OutputAnswer,
-    Quantiles,
 )
 from rbdyn.base.blocks import Block, Bullets, Column, Paragraph, Sheet, with_notes
 from rbdyn.base.files import digest_of, intact, read_json, sign, write_json
@@ -77,20 +76,6 @@ CELLS: tuple[Column[Cell], ...] = (
 )
 
 
-def _end(when: str, place: int, cell: Cell) -> float:
-    """5, 50 or 95 % of a prediction."""
-    ends: Quantiles = getattr(cell, when)
-    return ends[place]
-
-
-def prediction_columns(when: str) -> list[Column[Cell]]:
-    """Columns of the predictions "before" or "after" the calibration."""
-    return [
-        Column(f"{when}_{end}", at=partial(_end, when, place), meaning=f"predicted {when} the calibration")
-        for place, end in enumerate(("5_percent", "median", "95_percent"))
-    ]
-
-
 def input_sheet(calibration: Calibration) -> Sheet[InputRow]:
     """A row an input, those that contract most first."""
     learned, answers = calibration.learnt.learned, calibration.inputs
@@ -108,7 +93,10 @@ def output_sheet(calibration: Calibration) -> Sheet[OutputRow]:
 
 def cell_sheet(cells: Sequence[Cell], moments: Sequence[str] = ("before", "after")) -> Sheet[Cell]:
     """A row a measured value, with its predictions before and after the calibration."""
-    columns = [*CELLS, *(column for when in moments for column in prediction_columns(when))]
+    columns = [*CELLS]
+    for when in moments:
+        for place, end in enumerate(("5_percent", "median", "95_percent")):
+            columns.append(Column(f"{when}_{end}", at=(when, place), meaning=f"predicted {when} the calibration"))
     content = "One row per measured value: measured, simulated and predicted."
     return Sheet("", columns, cells, file=MEASURED, content=content)
 

@@ -176,18 +176,19 @@ def _means(points: Sequence[AtPoint], name: str) -> list[str]:
 def _points(duty: DutyAnswer) -> Table:
     """The points as the study states them, with their lives."""
     lives = [duty.life[name].point_hours for name in ("baseline", "pick")]
-    rows = [
-        (
-            point.name,
-            _percent(point.share),
-            ", ".join([*point.overrides, *([f"from {point.origin}"] if point.origin else [])]),
-            *(shown(hours[point.name], 3) for hours in lives),
-        )
-        for point in duty.points
-    ]
-    header = ("point", "share of time", "keys of the scene", "life at the baseline [h]", "at the selected design [h]")
+    columns: tuple[Column[AtPoint], ...] = (
+        Column("name", words="point"),
+        Column("share", _percent, "share of time"),
+        Column("set", words="keys of the scene", cell=_keys, text=True),
+        Column("", words="life at the baseline [h]", cell=lambda point: shown(lives[0][point.name], 3)),
+        Column("", words="at the selected design [h]", cell=lambda point: shown(lives[1][point.name], 3)),
+    )
     note = "Life at each point alone: ISO/TS 16281, static loads at the operating clearance."
-    return Table("Points of the duty", header, rows, note, text_columns=(2,))
+    return Sheet("Points of the duty", columns, duty.points, note).block
+
+
+def _keys(point: AtPoint) -> str:
+    return ", ".join([*point.overrides, *([f"from {point.origin}"] if point.origin else [])])
 
 
 def costs(summary: Summary) -> Iterator[Block]:

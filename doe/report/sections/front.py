@@ -8,9 +8,9 @@ import numpy as np
 from doe.report.sections.answer import tolerances
 from doe.report.sections.front_pictures import Front, Fronts, hypervolume, search_stills
 from doe.report.still import Still
-from doe.report.summary import SENSES, Summary, change, nearest, share_with_interval
+from doe.report.summary import SENSES, Summary, by_point, change, nearest, share_with_interval
 from doe.workflow.adaptive import Adaptive, FrontComparison, Pull, near_limits, pulls
-from doe.workflow.confirmation import ConfirmedPoint, point_words
+from doe.workflow.confirmation import ConfirmedPoint
 from doe.workflow.front_record import (
     WITHOUT,
     EstimatedPoint,
@@ -162,19 +162,10 @@ def robust_stills(front: RobustFront | None) -> list[Still]:
 
 
 def _picks(caption: str, asked: Asked, marks: Mapping[str, Point], detail: Detail = Detail.LEAST) -> Table:
-    rows = [
-        [
-            point_words(name),
-            *(factor.text(point.factors[factor.name], 1) for factor in asked.factors),
-            *(with_error(point.responses[response], _error(point, response)) for response in asked.names),
-        ]
-        for name, point in marks.items()
-    ]
-    return Table(caption, ["point", *map(label, asked.columns), *map(label, asked.names)], rows, detail=detail)
+    def cell(point: Point, name: str) -> str:
+        return with_error(point.responses[name], point.errors[name] if isinstance(point, EstimatedPoint) else None)
 
-
-def _error(point: Point, response: str) -> float | None:
-    return point.errors[response] if isinstance(point, EstimatedPoint) else None
+    return by_point(caption, asked, marks, cell, detail, 1)
 
 
 def _gains(caption: str, gains: Mapping[str, PredictedGain]) -> Table:

@@ -14,7 +14,7 @@ from rbdyn.base.blocks import Block, Bullets, Column, Paragraph, Section, Sheet,
 from rbdyn.base.files import write_json
 from rbdyn.base.records import Record, written
 from rbdyn.base.tables.sheet import text_of
-from rbdyn.base.words import counted, quantity, shown, with_error
+from rbdyn.base.words import counted, quantity, shown
 from rbdyn.scene.unknown import UnknownInput
 
 # Most inputs that a sentence names, and the least share of one.
@@ -117,7 +117,7 @@ def range_sentence(output: OutputRange) -> str:
     """'impact force 87.1 ± 0.4 N; 60 to 132 N in 90 % of the cases over the unknown inputs; the bar stiffness causes 87 %'."""
     words, unit = quantity(output.name)
     nominal, ends = output.nominal, output.input
-    head = f"{words} {with_error(nominal.value, nominal.stated_error)} {unit}".rstrip()
+    head = f"{words} {nominal.text} {unit}".rstrip()
     if output.hidden:
         return f"{head}; simulation noise exceeds the effect of the inputs"
     interval = f"{shown(ends.low)} to {shown(ends.high)} {unit}".rstrip()
