@@ -137,9 +137,9 @@ def combination(seed):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", [0, 1, 2, 4, 8, 3, 7, 11, 15, 19])
 def test_command_line_scenes_with_heat_run(command, tmp_path, seed):
-    """Command line: every scene with heat is accepted; it ends steady or with a status, never refused."""
+    """Command line: rollers, then balls, each with every supply; a scene with heat ends steady or with a status, never refused."""
     path = tmp_path / "hot.toml"
     written = command("new", *combination(seed), "--out", path)
     assert written.returncode == 0, written.stderr
