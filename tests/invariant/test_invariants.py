@@ -28,7 +28,7 @@ SCENES = pytest.mark.parametrize("fixture", ["outer", "inner", "everything"])
 
 
 @pytest.mark.parametrize(
-    ("files", "share"), [(INTERPRETED, 0.3), pytest.param(INTERPRETED[:1], 1.0, marks=pytest.mark.slow)]
+    ("files", "share"), [(INTERPRETED, 0.1), pytest.param(INTERPRETED[:1], 1.0, marks=pytest.mark.slow)]
 )
 def test_invariant_over_scenes_of_every_make(files, share):
     """Invariant, agreement: ``interpreted_invariants`` over a share of its scenes, and ``interpreted_leave_out``, in a process

@@ -205,7 +205,7 @@ def test_mean_force_slides_at_the_speed_of_the_rollers():
 
 
 def test_a_study_computes_only_what_it_names(tmp_path):
-    """Scenes of a study leave out sums, stiffness and trace that no response or limit needs; figures that remain keep their bits without them."""
+    """Scenes of a study leave out sums, stiffness and trace that no response or limit needs."""
     problem = Problem.load(short_study(tmp_path))
     scene = problem.scene_at(problem.baseline, 1)
     assert not scene.damage.impacts and not scene.damage.races
@@ -224,11 +224,6 @@ def test_a_study_computes_only_what_it_names(tmp_path):
     stiff = Problem.load(path)
     scene = stiff.scene_at(stiff.baseline, 1)
     assert scene.numerics.stiffness and scene.verdict.trace and not scene.damage.impacts
-    full, bare = result(), result("damage.impacts=false")
-    missing = {"impacts_per_turn", "impact_energy_J", "impact_fatigue_force_N"}
-    assert set(full.damage) - set(bare.damage) == missing
-    assert bare.figures == full.figures and bare.power_terms_W == full.power_terms_W
-    assert bare.damage == {key: figure for key, figure in full.damage.items() if key not in missing}
 
 
 def test_impacts_are_fewer_the_faster_they_must_be():
@@ -242,12 +237,15 @@ def test_impacts_are_fewer_the_faster_they_must_be():
     assert "impact_energy_J" not in none and "impact_fatigue_force_N" not in none
 
 
-def test_samples_of_the_races_change_no_motion():
-    """Without the samples every other figure keeps its bits; with them power density is largest at the inner race."""
-    full, bare = result(), result("damage.races=false")
-    sampled = [figure.key for figure in DAMAGE if figure.switch == "damage.races"]
-    assert len(sampled) == 8 and set(full.damage) - set(bare.damage) == set(sampled)
+def test_impacts_and_samples_of_the_races_change_no_motion():
+    """Without both every other figure keeps its bits; with them power density is largest at the inner race."""
+    full, bare = result(), result("damage.impacts=false", "damage.races=false")
+    sampled = {figure.key for figure in DAMAGE if figure.switch == "damage.races"}
+    missing = sampled | {"impacts_per_turn", "impact_energy_J", "impact_fatigue_force_N"}
+    assert len(sampled) == 8 and set(full.damage) - set(bare.damage) == missing
     assert bare.figures == full.figures and bare.power_terms_W == full.power_terms_W
+    assert bare.damage == {key: figure for key, figure in full.damage.items() if key not in missing}
+    assert bare.pocket_impacts is None
     damage = full.damage
     assert damage["inner_power_density_W_mm2"].value > damage["outer_power_density_W_mm2"].value > 0.0
     assert damage["entry_slip_95_m_s"].value > damage["entry_slip_m_s"].value > 0.0
@@ -262,7 +260,7 @@ def test_light_loads_enter_with_more_slip():
 
 def test_each_roller_enters_once_a_turn_of_the_cage():
     """Entries of all rollers are as many as passes of rollers through the load zone, within the two at the ends."""
-    scene = Scene.load(ROOT / "examples" / "cylindrical_roller.toml", ["damage.impacts=false"])
+    scene = Scene.load(ROOT / "examples" / "cylindrical_roller.toml")
     run = Run(scene, roller_bearing(scene), 0, scene.numerics.rtol, Stop())
     run.to(3.0)
     run.forget()
@@ -296,7 +294,6 @@ def test_pockets_share_the_impacts():
     whole = (numbers @ forces**8 / numbers.sum()) ** 0.125
     assert whole == pytest.approx(run.damage["impact_fatigue_force_N"].value)
     assert SimulationResult.from_dict(json.loads(json.dumps(run.as_dict()))).pocket_impacts == pockets
-    assert result("damage.impacts=false").pocket_impacts is None
 
 
 def test_wear_follows_sliding_over_its_track():
