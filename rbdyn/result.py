@@ -276,6 +276,40 @@ class HeatBalance(Record, kw_only=True):
     path_C: list[dict[str, float]]  # noqa: N815
 
 
+class BallHeatBalance(Record, kw_only=True):
+    """Heat balance of a row of balls: its end, and heat, conductances and temperatures by node or way out.
+
+    - ``status``: "steady", or with its ``reason`` "undecided", "no steady state", "seizure" or "too hot"
+    - ``gain`` of the loop; ``friction_W`` "rolling" and "sliding", and the loads of the friction model
+    - ``clearance_um`` and ``unloaded_angle_deg``: "drawn" and "operating"
+    - ``path_C``, ``path_heat_W`` and ``path_clearance_um`` of the states visited
+    """
+
+    status: str
+    gain: float
+    heat_W: dict[str, float]  # noqa: N815
+    clearance_um: dict[str, float]
+    unloaded_angle_deg: dict[str, float]
+    friction_W: dict[str, float]  # noqa: N815
+    friction_loads_N: dict[str, float]  # noqa: N815
+    carried_off_W: dict[str, float]  # noqa: N815
+    conductances_W_K: dict[str, float]  # noqa: N815
+    ranges: Ranges = spread()
+    path_C: list[dict[str, float]]  # noqa: N815
+    path_heat_W: list[float]  # noqa: N815
+    path_clearance_um: list[float]
+    reason: str | None = None
+
+
+class ColdSeizure(Record):
+    """Heat balance of a bearing that is impossible before any heat, at the temperatures of the cold machine."""
+
+    status: str
+    reason: str
+    gain: None
+    path_C: list[dict[str, float]]  # noqa: N815
+
+
 class LeastClearance(Record):
     """Least diametral clearance of a start [um], and when; ``time_s``: None where it falls to its steady value without a minimum."""
 

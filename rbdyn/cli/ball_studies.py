@@ -19,7 +19,6 @@ from rbdyn.clearances import other_ranges
 from rbdyn.quasistatic.preload import Scan, over_clearance, over_preload, over_wear
 from rbdyn.quasistatic.result import (
     RACES,
-    BallHeatBalance,
     BallResult,
     DoubleDeckerReport,
     RowReport,
@@ -32,9 +31,10 @@ from rbdyn.quasistatic.result import (
 from rbdyn.quasistatic.runout.lots import Lot, bench_of, design, follow_ring, single_row
 from rbdyn.quasistatic.runout.turn import RingPath, ToleranceClass, running_accuracy
 from rbdyn.quasistatic.sweep import PointRecord, SweepResult, keys_of_texts, result_of, sweep
-from rbdyn.result import start_sheet
+from rbdyn.result import BallHeatBalance, start_sheet
 from rbdyn.scene import BallScene
 from rbdyn.scene.ball import SingleRowScene
+from rbdyn.scene.fits import Fits
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -314,7 +314,7 @@ def equilibrium_blocks(result: BallResult) -> list[Block]:
     report = result.reached
     if isinstance(report, DoubleDeckerReport):
         sentences += _middle_ring(report)
-    moment = report.reaction["moment_Nm"] if report.reaction else {}
+    moment = report.reaction.moment_Nm if report.reaction else {}
     if any(moment.values()):
         sentences.append(
             "moment on the inner ring: " + ", ".join(f"about {axis} {moment[axis]:.4g} N m" for axis in "xy")
@@ -397,9 +397,9 @@ def _row_sentences(row: RowReport) -> list[str]:
         pressed = f"up to {contact['load_N']:.4g} N, {row.max_stress_MPa[race]:.0f} MPa"
         sentences.append(f"{race} raceway: {pressed} on an ellipse of semi-axes {axes} µm{_edge(contact)}{film}")
     life = row.life
-    if life["L10_Mrev"] is not None:
-        hours = f", {shown(life['L10_h'], 3)} h" if life["L10_h"] is not None else ""
-        sentences.append(f"life L10r: {shown(life['L10_Mrev'], 3)} million turns{hours} ({life['method']})")
+    if life.L10_Mrev is not None:
+        hours = f", {shown(life.L10_h, 3)} h" if life.L10_h is not None else ""
+        sentences.append(f"life L10r: {shown(life.L10_Mrev, 3)} million turns{hours} ({life.method})")
     return [*sentences, f"stiffness: {_diagonal(row.stiffness)}"]
 
 
@@ -427,11 +427,10 @@ def _middle_ring(report: DoubleDeckerReport) -> list[str]:
     ]
 
 
-def _fits(fits: dict[str, Any]) -> str:
-    loosens = fits["inner_ring_loosens_rpm"]
-    state = "loose" if fits["inner_ring_loose"] else "tight"
+def _fits(fits: Fits) -> str:
+    state, loosens = "loose" if fits.inner_ring_loose else "tight", fits.inner_ring_loosens_rpm
     when = "at no speed" if loosens is None else f"at {loosens:.4g} rpm"
-    pressed = f"{fits['inner_pressure_MPa']:.4g} MPa on the shaft, {fits['outer_pressure_MPa']:.4g} MPa in the housing"
+    pressed = f"{fits.inner_pressure_MPa:.4g} MPa on the shaft, {fits.outer_pressure_MPa:.4g} MPa in the housing"
     return f"fits: {pressed}; the inner ring is {state}, rotation loosens it {when}"
 
 

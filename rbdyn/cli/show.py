@@ -184,8 +184,9 @@ def _race(motion: "History", race: "Race") -> dict[str, float]:
 def _life(motion: "History") -> dict[str, float | str | None]:
     """Of the contact loads shown; None where nothing is loaded or nothing turns."""
     life, method = motion.life(), "ISO/TS 16281 reference life from the contact loads over time"
-    record = life.as_record(*motion.scene.operation.speeds)
-    return {**record, "equivalent_load_N": life.equivalent_load, "method": method}
+    figures = life.figures(*motion.scene.operation.speeds)
+    turns, hours = figures.L10_Mrev, figures.L10_h
+    return {"L10_Mrev": turns, "L10_h": hours, "equivalent_load_N": life.equivalent_load, "method": method}
 
 
 def _largest(hit: "Largest") -> dict[str, float | int | None]:

@@ -312,10 +312,10 @@ def _life_sentence(result: SimulationResult) -> str:
     if result.status != "ok":
         return ""
     scene = simulated_scene(result)
-    life = static_life(scene).as_record(*scene.operation.speeds)
-    if life["L10_h"] is None:
+    life = static_life(scene).figures(*scene.operation.speeds)
+    if life.L10_h is None:
         return ""
-    return f"life L10r: {shown(life['L10_h'], 2)} h, {shown(life['L10_Mrev'], 2)} million turns (ISO/TS 16281, static loads)"
+    return f"life L10r: {shown(life.L10_h, 2)} h, {shown(life.L10_Mrev, 2)} million turns ({life.method}, static loads)"
 
 
 def _stiffness_sentence(result: SimulationResult) -> str:

@@ -49,14 +49,22 @@ class Life:
     inner_capacity: float
     outer_capacity: float
 
-    def as_record(self, inner_speed: float, outer_speed: float) -> dict[str, float | None]:
-        """Life for a report, in turns and in hours at ring speeds [rad/s]; None for an infinite life."""
-        return {"L10_Mrev": finite(self.million_turns), "L10_h": finite(self.hours(inner_speed, outer_speed))}
+    def figures(self, inner_speed: float, outer_speed: float) -> "LifeFigures":
+        """Life for a report, at ring speeds [rad/s]."""
+        return LifeFigures(finite(self.million_turns), finite(self.hours(inner_speed, outer_speed)))
 
     def hours(self, inner_speed: float, outer_speed: float = 0.0) -> float:
         """Life in hours at ring speeds [rad/s]; infinite without relative speed."""
         speed = abs(inner_speed - outer_speed)
         return self.million_turns * 1e6 * 2.0 * math.pi / speed / 3600.0 if speed > 0.0 else math.inf
+
+
+class LifeFigures(Record):
+    """Reference life in turns and in hours; None for an infinite life."""
+
+    L10_Mrev: float | None
+    L10_h: float | None
+    method: str = "ISO/TS 16281"
 
 
 BALL_EXPONENT, ROLLER_EXPONENT = 3.0, 10.0 / 3.0

@@ -20,11 +20,12 @@ from rbdyn.base.words import counted
 from rbdyn.life.balls import FASTEST
 from rbdyn.mounting.cage import OperatingClearance
 from rbdyn.quasistatic import finite_search
-from rbdyn.quasistatic.double_decker import double_decker_of, load_record, middle_ring, solve_double_decker
+from rbdyn.quasistatic.double_decker import double_decker_of, middle_ring, solve_double_decker
 from rbdyn.quasistatic.result import (
     BallResult,
     DoubleDeckerReport,
     Rating,
+    RingLoad,
     RowReport,
     ball_records,
     displacement_record,
@@ -99,7 +100,7 @@ def _single_row(scene: SingleRowScene, warm: Solution | None) -> BallResult:
     if why := overload(solution, rating):
         return replace(base, status=why)
     film = film_record(scene, rating, solution, ("inner_ring", "outer_ring"))
-    report = row_report(rating, solution, film, load_record(solution.reaction))
+    report = row_report(rating, solution, film, RingLoad.of(solution.reaction))
     grown = growth_record(scene, {"inner_less_outer_race": row_change(scene)})
     notes = [*_limit_notes(scene, model), *(() if scene.lubricant is None else scene.lubricant.estimates)]
     notes += [remark.note for remark in (*remarks(solution, rating), *tipping(solution.displacement, scene))]
@@ -173,7 +174,7 @@ def _double_decker(scene: DoubleDeckerScene, starts: tuple[Solution, ...]) -> Ba
     report = DoubleDeckerReport(
         **displacement_record(solution.displacement),
         stiffness=stiffness_record(solution.stiffness),
-        reaction=load_record(solution.reaction),
+        reaction=RingLoad.of(solution.reaction),
         middle_ring=middle_ring(model, solution),
         residual_N=solution.residual,
         iterations=solution.steps + sum(row.steps for row in rows),

@@ -19,7 +19,7 @@ z (P0/C0)^y, with z = 0.001, y = 0.33 for angular contact and z = 0.0004 to 0.00
 """
 
 import math
-from typing import Any, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -29,7 +29,7 @@ from rbdyn.base.records import finite
 from rbdyn.contact.point_contact import PointContact
 from rbdyn.life import balls
 from rbdyn.mounting.rings import GrooveChange
-from rbdyn.quasistatic.result import MiddleRing, displacement_record
+from rbdyn.quasistatic.result import MiddleRing, RingLoad, displacement_record
 from rbdyn.quasistatic.row.ball import CommonCage, Control, FixedShare
 from rbdyn.quasistatic.row.equilibrium import OK, Solution, solve, without_noise
 from rbdyn.quasistatic.row.model import RowModel, contacts, row_model
@@ -518,11 +518,5 @@ def middle_ring(model: DoubleDeckerModel, solution: DoubleDeckerSolution) -> Mid
         speed_share=finite(split.share),
         speed_status=split.status,
         friction_torque_Nmm=finite(1e3 * split.torque),
-        **load_record(solution.middle_load),
+        load=RingLoad.of(solution.middle_load),
     )
-
-
-def load_record(load: Array) -> dict[str, Any]:
-    """Record of the load (5,) on a ring."""
-    force, moment = load[:3].tolist(), load[3:].tolist()
-    return {"load_N": dict(zip("xyz", force, strict=True)), "moment_Nm": dict(zip("xy", moment, strict=True))}

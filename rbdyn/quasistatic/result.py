@@ -20,15 +20,15 @@ from rbdyn.contact import point_contact
 from rbdyn.contact.film_thickness import lambda_ratio
 from rbdyn.contact.hertz_line import BALLS, SHAKEDOWN, dent_sentence, overload_sentence
 from rbdyn.contact.point_contact import PointContact, peak_pressure
-from rbdyn.life import Life, Turning, turning_rings
+from rbdyn.life import Life, LifeFigures, Turning, turning_rings
 from rbdyn.life.balls import dynamic_capacity, rated_capacities, row_life
 from rbdyn.properties.materials import equivalent_modulus
 from rbdyn.quasistatic.row.ball import FixedShare, FrictionShare
 from rbdyn.quasistatic.row.equilibrium import INNER_ANGLE, INNER_LOAD, MOMENT, OUTER_ANGLE, OUTER_LOAD, PULL, Solution
 from rbdyn.quasistatic.row.model import RowModel
-from rbdyn.result import Ranges, SavedRecord, StartResult
+from rbdyn.result import BallHeatBalance, ColdSeizure, SavedRecord, StartResult
 from rbdyn.scene.ball import BallRow, BallScene
-from rbdyn.scene.fits import race_film_temperature
+from rbdyn.scene.fits import Fits, race_film_temperature
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -213,6 +213,18 @@ class RingPlace(Record):
     tilt_mrad: dict[str, float]
 
 
+class RingLoad(Record):
+    """Load that a ring takes, and its moment, by axis."""
+
+    load_N: dict[str, float]  # noqa: N815
+    moment_Nm: dict[str, float]  # noqa: N815
+
+    @classmethod
+    def of(cls, load: Array) -> Self:
+        """The load (5,) of an equilibrium."""
+        return cls(dict(zip("xyz", load[:3].tolist(), strict=True)), dict(zip("xy", load[3:].tolist(), strict=True)))
+
+
 class RowReport(RingPlace):
     """Equilibrium of one row, units in the names: displacement of its inner ring, figures of each ball and of each race.
 
@@ -224,12 +236,12 @@ class RowReport(RingPlace):
     max_stress_MPa: dict[str, float]  # noqa: N815
     contacts: dict[str, dict[str, float]]
     stiffness: dict[str, Any]
-    life: dict[str, Any]
+    life: LifeFigures
     needed_friction: float
     residual_N: float  # noqa: N815
     iterations: int
     searches: int | None = None
-    reaction: dict[str, dict[str, float]] | None = None
+    reaction: RingLoad | None = None
 
     @property
     def figures(self) -> dict[str, float | None]:
@@ -237,7 +249,7 @@ class RowReport(RingPlace):
         loaded = [ball for ball in self.balls if ball["inner_load_N"] > NO_LOAD]
         angles = [ball["inner_angle_deg"] for ball in loaded]
         figures: dict[str, float | None] = {f"{race}_pressure_MPa": p for race, p in self.max_stress_MPa.items()}
-        figures["life_Mrev" if self.life["L10_h"] is None else "life_h"] = self.life["L10_h"] or self.life["L10_Mrev"]
+        figures["life_Mrev" if self.life.L10_h is None else "life_h"] = self.life.L10_h or self.life.L10_Mrev
         for race, contact in self.contacts.items():
             figures |= {
                 f"{race}_{key}": contact.get(key)
@@ -255,54 +267,19 @@ class MiddleRing(RingPlace):
     speed_share: float | None
     speed_status: str
     friction_torque_Nmm: float | None  # noqa: N815
-    load_N: dict[str, float]  # noqa: N815
-    moment_Nm: dict[str, float]  # noqa: N815
+    load: RingLoad = spread()
 
 
 class DoubleDeckerReport(RingPlace):
     """Equilibrium of a double-decker bearing: its inner ring, its middle ring and both rows."""
 
     stiffness: dict[str, Any]
-    reaction: dict[str, dict[str, float]]
+    reaction: RingLoad
     middle_ring: MiddleRing
     residual_N: float  # noqa: N815
     iterations: int
     inner: RowReport
     outer: RowReport
-
-
-class BallHeatBalance(Record, kw_only=True):
-    """Heat balance of a row of balls: its end, and heat, conductances and temperatures by node or way out.
-
-    - ``status``: "steady", or with its ``reason`` "undecided", "no steady state", "seizure" or "too hot"
-    - ``gain`` of the loop; ``friction_W`` "rolling" and "sliding", and the loads of the friction model
-    - ``clearance_um`` and ``unloaded_angle_deg``: "drawn" and "operating"
-    - ``path_C``, ``path_heat_W`` and ``path_clearance_um`` of the states visited
-    """
-
-    status: str
-    gain: float
-    heat_W: dict[str, float]  # noqa: N815
-    clearance_um: dict[str, float]
-    unloaded_angle_deg: dict[str, float]
-    friction_W: dict[str, float]  # noqa: N815
-    friction_loads_N: dict[str, float]  # noqa: N815
-    carried_off_W: dict[str, float]  # noqa: N815
-    conductances_W_K: dict[str, float]  # noqa: N815
-    ranges: Ranges = spread()
-    path_C: list[dict[str, float]]  # noqa: N815
-    path_heat_W: list[float]  # noqa: N815
-    path_clearance_um: list[float]
-    reason: str | None = None
-
-
-class ColdSeizure(Record):
-    """Heat balance of a bearing that is impossible before any heat, at the temperatures of the cold machine."""
-
-    status: str
-    reason: str
-    gain: None
-    path_C: list[dict[str, float]]  # noqa: N815
 
 
 class BallResult(Brief, SavedRecord, kw_only=True):
@@ -324,7 +301,7 @@ class BallResult(Brief, SavedRecord, kw_only=True):
     solver: str
     report: RowReport | DoubleDeckerReport | None = spread(default=None)
     ring_growth_um: dict[str, float] | None = None
-    fits: dict[str, Any] | None = None
+    fits: Fits | None = None
     other_roots: list[dict[str, Any]] | None = None
     notes: Notes | None = None
     cost: dict[str, float]
@@ -394,7 +371,9 @@ class BallResult(Brief, SavedRecord, kw_only=True):
         figures |= {f"stiffness_{key}": value for key, value in report.stiffness.items() if key != "matrix_SI"}
         if isinstance(report, DoubleDeckerReport):
             figures["middle_ring_speed_rpm"] = report.middle_ring.speed_rpm
-        figures |= {f"fit_{race}_pressure_MPa": (self.fits or {}).get(f"{race}_pressure_MPa") for race in RACES}
+        if self.fits is not None:
+            figures["fit_inner_pressure_MPa"] = self.fits.inner_pressure_MPa
+            figures["fit_outer_pressure_MPa"] = self.fits.outer_pressure_MPa
         nodes = {("ball" if node == "rollers" else node): value for node, value in (self.temperatures_C or {}).items()}
         figures |= {f"{node}_temperature_C": value for node, value in nodes.items()}
         if isinstance(self.thermal, BallHeatBalance):
@@ -410,7 +389,7 @@ class BallResult(Brief, SavedRecord, kw_only=True):
             of_row = f"{name} row " if name else ""
             stress = row.max_stress_MPa.items()
             figures += [Figure(f"{of_row}pressure, {race} raceway", p, None, "MPa") for race, p in stress]
-            figures.append(Figure(f"{of_row}life L10", row.life["L10_Mrev"], None, "million turns"))
+            figures.append(Figure(f"{of_row}life L10", row.life.L10_Mrev, None, "million turns"))
         for axis in "xyz" if self.report else "":
             figures.append(Figure(f"displacement {axis}", 1e3 * self.reached.displacement_mm[axis], None, "µm"))
             figures.append(Figure(f"stiffness {axis}", self.reached.stiffness[f"{axis}_N_per_um"], None, "N/µm"))
@@ -479,7 +458,7 @@ def stiffness_record(stiffness: Array) -> dict[str, Any]:
     }
 
 
-def row_report(rating: Rating, solution: Solution, film: dict[str, Any], reaction: dict[str, Any] | None) -> RowReport:
+def row_report(rating: Rating, solution: Solution, film: dict[str, Any], reaction: RingLoad | None) -> RowReport:
     """Report of one row; ``film``: as ``film_record`` gives it."""
     life = solution_life(solution, rating.capacities, turning_rings(*rating.speeds))
     return RowReport(
@@ -495,7 +474,7 @@ def row_report(rating: Rating, solution: Solution, film: dict[str, Any], reactio
             for race in RACES
         },
         stiffness=stiffness_record(solution.stiffness),
-        life={**life.as_record(*rating.speeds), "method": "ISO/TS 16281"},
+        life=life.figures(*rating.speeds),
         needed_friction=needed_friction(solution, rating),
         residual_N=solution.residual,
         iterations=solution.steps,

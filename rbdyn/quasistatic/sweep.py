@@ -29,7 +29,6 @@ from rbdyn.base.records import derived, finite, keyed, outside_json, save_table
 from rbdyn.base.words import counted
 from rbdyn.quasistatic.bearing import equilibrium
 from rbdyn.quasistatic.result import (
-    BallHeatBalance,
     DoubleDeckerReport,
     Remark,
     ball_columns,
@@ -40,7 +39,7 @@ from rbdyn.quasistatic.result import (
     tipping,
 )
 from rbdyn.quasistatic.row.equilibrium import FIGURES, OK, Solution
-from rbdyn.result import SavedRecord
+from rbdyn.result import BallHeatBalance, SavedRecord
 from rbdyn.scene import BallScene, Scene, balls_only
 from rbdyn.scene.ball import SingleRowScene
 from rbdyn.scene.thermal import first_guess_faults
@@ -351,7 +350,7 @@ def _solve(scene: BallScene, before: tuple[Solution, ...]) -> PointRecord:
         return PointRecord(result.status, {}, nothing, [], (), not started)
     report = result.reached
     assert report.reaction is not None
-    reaction = np.array([*report.reaction["load_N"].values(), *report.reaction["moment_Nm"].values()])
+    reaction = np.array([*report.reaction.load_N.values(), *report.reaction.moment_Nm.values()])
     figures = ring_figures(result.displacement, reaction, np.array(report.stiffness["matrix_SI"]))
     found = tipping(result.displacement, scene)
     for name, rating, solution in zip(rows, result.ratings, result.rows, strict=True):

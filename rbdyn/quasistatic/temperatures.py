@@ -29,10 +29,10 @@ from rbdyn.life import friction
 from rbdyn.life.balls import FASTEST, static_capacity
 from rbdyn.properties.catalogue import diameter_series
 from rbdyn.properties.materials import MATERIALS, equivalent_modulus
-from rbdyn.quasistatic.result import BallHeatBalance, BallResult, ColdSeizure, Rating, overload, reference_capacities
+from rbdyn.quasistatic.result import BallResult, Rating, overload, reference_capacities
 from rbdyn.quasistatic.row.equilibrium import Solution, solve
 from rbdyn.quasistatic.row.model import RowModel, cage_speed, clearance_of, constraint_of, load_of, row_of
-from rbdyn.result import Ranges
+from rbdyn.result import BallHeatBalance, ColdSeizure, Ranges
 from rbdyn.scene.ball import SingleRowScene
 from rbdyn.scene.fits import race_film_temperature
 from rbdyn.scene.input_ranges import input_ranges

@@ -3,7 +3,7 @@
 from typing import Any, NamedTuple
 
 from rbdyn.base.faults import RPM
-from rbdyn.base.records import finite
+from rbdyn.base.records import Record, finite
 from rbdyn.mounting.cage import CageBody, CageClearances, guide_clearance, pocket_circle_shift, pocket_clearance
 from rbdyn.mounting.rings import (
     UNCHANGED,
@@ -185,6 +185,15 @@ def printed(scene: BallScene) -> bool:
     return scene.model.ring_expansion_form == "paper" and scene.mounting is None
 
 
+class Fits(Record):
+    """Pressures between rings and seats, and whether the inner ring is loose; ``inner_ring_loosens_rpm``: None at no speed."""
+
+    inner_pressure_MPa: float  # noqa: N815
+    outer_pressure_MPa: float  # noqa: N815
+    inner_ring_loosens_rpm: float | None
+    inner_ring_loose: bool
+
+
 def growth_record(scene: BallScene, names: dict[str, GrooveChange]) -> dict[str, Any]:
     """Growth and fits as reported; empty for a scene without growth."""
     if not changes(scene):
@@ -192,13 +201,8 @@ def growth_record(scene: BallScene, names: dict[str, GrooveChange]) -> dict[str,
     record: dict[str, Any] = {"ring_growth_um": {name: 1e6 * change.radial for name, change in names.items()}}
     rings = mounted_of(scene)
     if rings is not None:
-        record["fits"] = {
-            "inner_pressure_MPa": 1e-6 * rings.inner_pressure,
-            "outer_pressure_MPa": 1e-6 * rings.outer_pressure,
-            # null: at no speed.
-            "inner_ring_loosens_rpm": finite(rings.loosening_speed / RPM),
-            "inner_ring_loose": rings.inner_pressure == 0.0,
-        }
+        pressures = 1e-6 * rings.inner_pressure, 1e-6 * rings.outer_pressure
+        record["fits"] = Fits(*pressures, finite(rings.loosening_speed / RPM), rings.inner_pressure == 0.0)
     return record
 
 

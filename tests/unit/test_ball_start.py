@@ -97,7 +97,7 @@ def test_oracle_rows_are_equilibria_at_stated_temperatures(cold):
         assert hot.mounting.housing_temperature_C == nodes[4]
         stated = rbdyn.equilibrium(hot)
         at_row = {name: column[row] for name, column in path["figures"].items()}
-        assert abs(stated.reaction["load_N"]["z"]) == pytest.approx(at_row["axial_load_N"], rel=1e-4)
+        assert abs(stated.reaction.load_N["z"]) == pytest.approx(at_row["axial_load_N"], rel=1e-4)
         assert max(stated.max_stress_MPa.values()) == pytest.approx(at_row["contact_pressure_MPa"], rel=1e-4)
         assert float(radial_clearance(hot, scene.thermal, nodes)) == pytest.approx(at_row["radial_um"], abs=1e-3)
 

@@ -37,7 +37,7 @@ def test_losses_stand_by_size_with_their_sum(result):
 def test_inputs_life_clearances_and_the_next_command_are_said(result, make_scene):
     """Literature: the life is that of ISO/TS 16281 by static loads, to two digits; the folder is the real one."""
     scene = make_scene(*QUICK)
-    hours = static_life(scene).as_record(*scene.operation.speeds)["L10_h"]
+    hours = static_life(scene).figures(*scene.operation.speeds).L10_h
     full = text(blocks(result, Path("run one")), Detail.ALL)
     assert f"life L10r: {shown(hours, 2)} h" in full and "next: rbdyn show run one --animate" in full
     assert f"drawn +{1e3 * scene.bearing.radial_clearance_mm:.1f} µm" in full and "operating +" in full
