@@ -6,7 +6,6 @@ import json
 import subprocess
 import sys
 
-import pytest
 from conftest import EXAMPLE, SHORT
 
 HEAVY = ("numba", "scipy", "pandas", "sklearn", "pymoo", "matplotlib")
@@ -138,17 +137,3 @@ def test_command_line_failing_run(command):
     again = command(*arguments, "--json")
     assert again.returncode == 1
     assert json.loads(again.stdout)["status"].startswith("failed: replicate")
-
-
-@pytest.mark.slow
-def test_command_line_second_process_finds_compiled_code(command, tmp_path):
-    """Command line: the first process compiles, the second loads; a read-only cache folder does no harm.
-
-    Compares two times of the same machine by a wide factor: compiling takes about a hundred times as long as loading.
-    """
-    arguments = ("simulate", EXAMPLE, *QUICK, "--json")
-    first, second = (
-        json.loads(command(*arguments, NUMBA_CACHE_DIR=str(tmp_path)).stdout)["cost"]["compile_s"] for _ in range(2)
-    )
-    assert second < 0.25 * first
-    assert list(tmp_path.rglob("*.nbc"))

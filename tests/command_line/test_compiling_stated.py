@@ -1,4 +1,4 @@
-"""That something is compiled is said once, while it is, on standard error; quietly not."""
+"""That something is compiled is said once, while it is, on standard error; quietly not, nor by the next process."""
 
 import json
 import os
@@ -6,16 +6,24 @@ import subprocess
 import sys
 from pathlib import Path
 
-import pytest
+from rbdyn.base.command import notice
+from rbdyn.compiled.kernel import Compiling
 
 BALLS = Path(__file__).parents[2] / "examples" / "deep_groove_ball.toml"
 
 
-@pytest.mark.parametrize(("option", "said"), [("--json", 1), ("-q", 0)])
-def test_compiling_is_said_once(tmp_path, option, said):
-    """With an empty folder of compiled code; standard output is one object with --json."""
-    command = [sys.executable, "-m", "rbdyn", "ball", str(BALLS), option]
+def test_compiling_is_said_once_and_kept_for_the_next_process(tmp_path):
+    """With an empty folder of compiled code, and again with what is in it then; standard output is one object."""
+    command = [sys.executable, "-m", "rbdyn", "ball", str(BALLS), "--json"]
     environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path)}
-    shown = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=300, check=True)
-    assert shown.stderr.count("Compiling ...") == said and "Compiling" not in shown.stdout
-    assert option == "-q" or json.loads(shown.stdout)["status"] == "ok"
+    for said in (1, 0):
+        shown = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=300, check=True)
+        assert shown.stderr.count("Compiling ...") == said and "Compiling" not in shown.stdout
+        assert json.loads(shown.stdout)["status"] == "ok"
+
+
+def test_a_quiet_command_says_nothing_of_compiling(capsys):
+    for quiet in (False, True):
+        notice(quiet)
+        Compiling().begin()
+        assert capsys.readouterr().err.count("Compiling ...") == (not quiet)

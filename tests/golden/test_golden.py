@@ -36,7 +36,7 @@ def test_golden_numbers(case):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("case", ["motion outer", "motion everything", "equilibrium angular_contact_ball"])
+@pytest.mark.parametrize("case", ["motion everything", "equilibrium angular_contact_ball"])
 def test_golden_stock_numba(case):
     """Golden: compiled by stock numba, of which a name is gone that parts need, a scene has the bits of the usual way."""
     stock = by_stock(str(HERE.parent / "helpers" / "stock_numba.py"), case)

@@ -140,20 +140,6 @@ def test_the_example_as_german_excel_writes_it_has_the_same_numbers_bit_for_bit(
     )
 
 
-@pytest.mark.slow
-def test_the_example_as_german_excel_writes_it_has_the_same_fit_bit_for_bit(tmp_path):
-    """The same by the command, which also says that the paper has no impact power."""
-    expected = json.loads(doe("fit", STUDY, "--data", TABLE, "--json").stdout)
-    (left_out,) = expected.pop("notes")
-    for name, manner in written_abroad(tmp_path).items():
-        shown = json.loads(doe("fit", STUDY, "--data", tmp_path / name, "--json").stdout)
-        assert shown.pop("notes") == [
-            {"level": "note", "code": "table", "text": f"{tmp_path / name}: {manner}"},
-            {**left_out, "text": left_out["text"].replace(str(TABLE), str(tmp_path / name))},
-        ]
-        assert shown == expected
-
-
 def test_cells_of_a_workbook_are_named_in_its_own_way(tmp_path):
     """A date made of 1.2, a formula that was never computed, its fault, a unit, and a doubtful text."""
     cases = {
