@@ -37,6 +37,9 @@ SHORT = (
     "numerics.companion=false",
     "numerics.extend=false",
 )
+# Of a right-hand side alone: samples of the races are not in it, and their scale is a distribution of static loads, with kernels of
+# its own for each set of laws.
+UNSAMPLED = "damage.races=false"
 CONSERVATIVE = (
     "traction.model=off",
     "model.race_damping=off",

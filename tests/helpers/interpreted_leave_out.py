@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 import pytest
-from conftest import law_types, make, right_hand_side, state_near_contact
+from conftest import UNSAMPLED, law_types, make, right_hand_side, state_near_contact
 from interpreted_invariants import REWRITTEN, on_both
 
 from rbdyn.accuracy.variants import OPTIONS
@@ -200,7 +200,7 @@ OTHERS = {
 @functools.cache
 def plain_outcome(seed):
     """State and right-hand side of the plain bearing, which half of the pairs are compared with."""
-    scene = make()
+    scene = make(UNSAMPLED)
     y = state_near_contact(scene, seed)
     return y, right_hand_side(roller_bearing(scene), y)
 
@@ -225,7 +225,7 @@ def test_unit_every_option_is_accounted_for():
 def test_unit_plain_path_equals_the_general_one(name):
     """Unit: contacts open, closed and sliding, in six states."""
     leave_out, put_in = NEUTRAL[name]
-    bearing = roller_bearing(make())
+    bearing = roller_bearing(make(UNSAMPLED))
     special, general = leave_out(bearing), put_in(bearing)
     assert law_types(special) != law_types(general)
     clock = isinstance(general.drive, ClockedDrive)

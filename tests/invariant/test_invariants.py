@@ -27,16 +27,12 @@ INTERPRETED = (HELPERS / "interpreted_invariants.py", HELPERS / "interpreted_lea
 SCENES = pytest.mark.parametrize("fixture", ["outer", "inner", "everything"])
 
 
-@pytest.mark.parametrize(
-    ("files", "share"), [(INTERPRETED, 0.1), pytest.param(INTERPRETED[:1], 1.0, marks=pytest.mark.slow)]
-)
-def test_invariant_over_scenes_of_every_make(files, share):
-    """Invariant, agreement: ``interpreted_invariants`` over a share of its scenes, and ``interpreted_leave_out``, in a process
-    where nothing is compiled."""
+def test_invariant_over_scenes_of_every_make():
+    """Invariant, agreement: ``interpreted_invariants`` and ``interpreted_leave_out``, in a process where nothing is compiled."""
     found = subprocess.run(
-        [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-p", "no:xdist", *files],
+        [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-p", "no:xdist", *INTERPRETED],
         cwd=HELPERS.parents[1],
-        env={**os.environ, "NUMBA_DISABLE_JIT": "1", "SHARE_OF_SCENES": str(share)},
+        env={**os.environ, "NUMBA_DISABLE_JIT": "1"},
         capture_output=True,
         text=True,
         check=False,

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
-from conftest import EVERYTHING, ROOT
+from conftest import EVERYTHING, ROOT, UNSAMPLED
 from numpy_twin import POWERS, twin
 
 from rbdyn.dynamics.forces.equations import pocket_loads
@@ -267,7 +267,7 @@ def test_oracle_twin_for_any_number_of_rollers(rollers, make_scene, evaluate, ra
 def test_oracle_twin_interpreted(interpreted, make_scene, random_state):
     """Oracle: the same for further meetings of laws, which are worth no compilation."""
     for name, assignments in (MEETINGS | TABLES).items():
-        scene = make_scene(*assignments)
+        scene = make_scene(*assignments, UNSAMPLED)
         outcomes = interpreted[tuple(assignments)]
         tolerances = TABLE if name in TABLES else FILM if scene.model.pocket_film else LAYER if fed(scene) else {}
         assert refused(scene, outcomes, random_state, tolerances) == {}, name
@@ -310,11 +310,11 @@ def switched(assignments):
 INTERPRETED = """
 import json, sys
 sys.path.insert(0, sys.argv[1])
-from conftest import make, right_hand_side, state_near_contact
+from conftest import UNSAMPLED, make, right_hand_side, state_near_contact
 from rbdyn.dynamics.parameters.model import roller_bearing
 out = []
 for assignments in json.loads(sys.argv[2]):
-    scene = make(*assignments)
+    scene = make(*assignments, UNSAMPLED)
     bearing = roller_bearing(scene)
     for seed in range(6):
         found = right_hand_side(bearing, state_near_contact(scene, seed))
