@@ -225,16 +225,19 @@ class Problem(Study):
 
     def _design_run(self, point: Array, seed: int, replicates: int | None = None) -> Run:
         """Scenes of a design run, with all their replicates unless another number is given, of which minor points have half."""
-        minor = set() if self.duty is None else self.duty.minor
 
         def scene(overrides: Sequence[str]) -> Scene:
             count = replicates
-            if count is not None and tuple(overrides) in minor:
+            if count is not None and self._is_minor(overrides):
                 count = max(count // 2, 2)
             effort = [] if count is None else [f"numerics.replicates={count}"]
             return self._scene_in_region(point, seed, [*overrides, *effort])
 
         return self._begun(self.over_duty(scene, self.baseline_scenes))
+
+    def _is_minor(self, overrides: Sequence[str]) -> bool:
+        """Whether the point of the duty with these overrides has half of the replicates; none where all judge the class of the cage."""
+        return self.duty is not None and not self.file.limits.classes and tuple(overrides) in self.duty.minor
 
     @cached_property
     def usual_run(self) -> Run:
@@ -388,9 +391,13 @@ class Problem(Study):
             ) from None
 
     def confirmation_run(self, point: Array, *, in_brief: bool = False) -> Run:
-        """Scenes of a confirmation run: more replicates and companions, fresh seeds; ``in_brief`` as few replicates as a design run, alone."""
+        """Scenes of a confirmation run: more replicates and companions, with seeds of their own.
+
+        ``in_brief``: as few replicates as a design run, alone, with heat balances that begin as those do.
+        """
         scene = partial(self._confirmation_scene, point, in_brief=in_brief)
-        return self.over_duty(scene, self.baseline_scenes, baseline_errors=True)
+        run = self.over_duty(scene, self.baseline_scenes, baseline_errors=True)
+        return self._begun(run) if in_brief else run
 
     def confirmation_scene(self, point: Array) -> Scene:
         """Scene of a confirmation run; over a duty, that at the point with the largest share of the time."""
@@ -399,6 +406,10 @@ class Problem(Study):
     def _confirmation_scene(self, point: Array, sets: Sequence[str], in_brief: bool = False) -> Scene:
         settings, seed = self.file.confirmation, self.file.design.seed + CONFIRMATION_SEEDS
         replicates = min(self.first_replicates, settings.replicates) if in_brief else settings.replicates
+        if self._is_minor(sets):
+            # A class of the cage needs some replicates alike.
+            fewest = 2 if in_brief else main_scene(self.usual_run).verdict.limits.fewest_replicates
+            replicates = max(replicates // 2, min(replicates, fewest))
         effort = [f"numerics.replicates={replicates}", f"numerics.companion={str(not in_brief).lower()}"]
         scene = self.scene_at(point, seed, [*sets, *effort, *settings.set], confirms=True)
         needed = scene.verdict.limits.fewest_replicates

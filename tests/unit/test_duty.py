@@ -164,8 +164,8 @@ def test_every_point_of_a_run_has_its_seed(tmp_path):
 @pytest.mark.parametrize(
     ("idle", "aggregate", "replicates"), [(0.2, "mean", [2, 4]), (0.2, "worst_relative", [4, 4]), (0.3, "mean", [4, 4])]
 )
-def test_minor_points_have_half_of_the_replicates_of_design_runs(tmp_path, idle, aggregate, replicates):
-    """Unit: a point with at most a quarter of the main share, where all goals are means; confirmations have all everywhere."""
+def test_minor_points_have_half_of_the_replicates(tmp_path, idle, aggregate, replicates):
+    """Unit: a point with at most a quarter of the main share, where all goals are means; confirmed ones still name a class."""
     duty = IDLE_AND_CRUISE.replace("0.25", str(idle)).replace("0.75", str(1.0 - idle))
     study = duty_study(
         tmp_path, duty, (IMPACT, f'{IMPACT}aggregate = "{aggregate}"\n'), ("replicates=2", "replicates=8")
@@ -174,8 +174,11 @@ def test_minor_points_have_half_of_the_replicates_of_design_runs(tmp_path, idle,
     for further in (False, True):
         for run in study.design_scenes(study.plan.actual, study.design.order.tolist(), further=further):
             assert [run.scenes[name].numerics.replicates for name in ("idle", "cruise")] == replicates
-    confirmed = study.confirmation_run(study.baseline).scenes.values()
-    assert {scene.numerics.replicates for scene in confirmed} == {study.file.confirmation.replicates}
+    for count, is_brief, every, half in ((16, False, 16, 8), (8, False, 8, 6), (2, False, 2, 2), (16, True, 4, 2)):
+        asked = study.with_file(confirmation=study.file.confirmation.model_copy(update={"replicates": count}))
+        confirmed = asked.confirmation_run(asked.baseline, in_brief=is_brief).scenes
+        expected = [half if replicates[0] < replicates[1] else every, every]
+        assert [confirmed[name].numerics.replicates for name in ("idle", "cruise")] == expected
 
 
 def test_equal_points_are_minor_by_their_share_together():

@@ -28,7 +28,7 @@ from doe.workflow.surfaces import fit_surfaces
 from rbdyn.base.faults import InputError, RunError
 from rbdyn.dynamics import simulate as simulation
 from rbdyn.mounting.cage import NEARLY_K, OperatingClearance, RunningClearance
-from rbdyn.result import Quantity
+from rbdyn.result import HeatBalance, Quantity, Ranges
 from rbdyn.scene import DrawnScene, Scene
 
 HOT_PARTS = """
@@ -264,9 +264,19 @@ def heats(monkeypatch, seizing: float = 0.0, oil: float = 80.0, slopes: list[lis
             instant_result(scene),
             temperatures_C={name: Quantity(value, 0.1, 0.1, 10.0, 9) for name, value in nodes.items()},
         )
-        record = {"status": "steady", "ranges": None, "path_C": [nodes]} | ({"slopes": slopes} if slopes else {})
+        nothing = {key: {} for key in ("heat_W", "carried_off_W", "conductances_W_K")}
+        record = HeatBalance(
+            status="steady",
+            gain=0.0,
+            slopes=slopes,
+            windage_W=0.0,
+            ranges=Ranges(None),
+            oil_fraction=None,
+            path_C=[nodes],
+            **nothing,
+        )
         if scene.cage.guide_clearance_mm < seizing:
-            return replace(result, status="seizure", thermal={**record, "reason": "the cage seizes when hot"})
+            return replace(result, status="seizure", thermal=replace(record, reason="the cage seizes when hot"))
         return replace(result, thermal=record)
 
     monkeypatch.setattr(simulation, "simulate", simulate)
@@ -294,8 +304,8 @@ def test_heat_balances_are_made_once_and_resumed(tmp_path, monkeypatch):
 
 
 def test_balances_of_design_runs_begin_in_the_middle_of_the_region(tmp_path, monkeypatch):
-    """The scenes and keys of design runs have its temperatures and slopes, rounded; those of confirmations have none, and the store
-    tells the same keys again."""
+    """The scenes and keys of design runs have its temperatures and slopes, rounded; those of confirmations have none unless in brief,
+    and the store tells the same keys again."""
     study, slopes = heated_study(tmp_path), (-0.123456 * np.eye(4)).tolist()
     heats(monkeypatch, slopes=slopes)
     region = region_that_runs(study, tmp_path, 1).study
@@ -304,6 +314,7 @@ def test_balances_of_design_runs_begin_in_the_middle_of_the_region(tmp_path, mon
         assert near.slopes[1] == [0.0, -0.12, 0.0, 0.0] and near.temperatures_C == [HEATED[name] for name in HEATED]
         assert Scene.from_dict(scene.model_dump(mode="json")).model_dump_json() == scene.model_dump_json()
     assert region.confirmation_run(region.baseline).thermal.near is None
+    assert region.confirmation_run(region.baseline, in_brief=True).thermal.near == near
     (adaptive,) = region.adaptive_scenes(region.baseline[None], [2], 0)
     assert adaptive.thermal.near == near
     keys = [point.key for point in points_of(region.plan.scenes, region.plan.labels)]
