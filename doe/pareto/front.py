@@ -224,8 +224,7 @@ def front(
         goals = Goals.of(["min"] * _values(objectives, (low + high)[None, :] / 2).shape[1])
     judge = barring(partial(_judged, objectives, goals, doubt), barred)
     searched, violations = _searched(judge, low, high, population, generations, seed, closest)
-    archives = searched.archives
-    points, costs = archives[-1]
+    points, costs = searched.archive
     ideal, nadir = costs.min(axis=0), costs.max(axis=0)
     baseline_values = None if baseline is None else _values(objectives, np.atleast_2d(baseline))[0]
     baseline_costs = None if baseline_values is None else goals.costs(baseline_values)
@@ -236,7 +235,7 @@ def front(
         values=_values(objectives, points[rows]),
         costs=costs[rows],
         hypervolume=hypervolume(costs, ideal, nadir),
-        hypervolume_history=growth([archive.costs for archive in archives], ideal, nadir),
+        hypervolume_history=growth([found.costs for found in searched.generations], ideal, nadir),
         ideal=ideal,
         nadir=nadir,
         knee=int(np.searchsorted(rows, best)),

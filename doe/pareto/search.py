@@ -54,27 +54,31 @@ def hypervolume(values: Array, ideal: Array, nadir: Array) -> float:
     return float(HV(ref_point=np.full(values.shape[1], REFERENCE))(inside)) if len(inside) else 0.0
 
 
-def growth(archives: Sequence[Array], ideal: Array, nadir: Array) -> Array:
-    """Hypervolume of each of ``archives``, all costs (n, m) found so far in a search without those that others dominate.
+def growth(generations: Sequence[Array], ideal: Array, nadir: Array) -> Array:
+    """Hypervolume of each of ``generations``, costs (n, m) found in turn in a search, with all before it.
 
     Exact for up to `EXACT` objectives. The exact volume of thousands of points in six would take hours; those of more are the
-    share of quasi-random levels that each archive dominates, within about 1 %: what one dominates, the next do too.
+    share of quasi-random levels that the points dominate, within about 1 %.
     """
     if ideal.size <= EXACT:
-        return np.array([hypervolume(costs, ideal, nadir) for costs in archives])
+        archives = accumulate(generations, _merged_costs, initial=generations[0][:0])
+        return np.array([hypervolume(costs, ideal, nadir) for costs in archives][1:])
     levels = REFERENCE * qmc.Sobol(ideal.size, seed=1).random_base2(LEVELS)
-    counts, known, total = list[int](), set[bytes](), len(levels)
-    for costs in archives:
-        rows = {row.tobytes(): row for row in normalised(costs, ideal, nadir)}
-        new = np.array([row for name, row in rows.items() if name not in known]).reshape(-1, ideal.size)
+    counts, total = list[int](), len(levels)
+    for costs in generations:
+        new = normalised(costs, ideal, nadir)
         for first in range(0, len(new), BLOCK):
             below = np.ones((min(BLOCK, len(new) - first), len(levels)), dtype=bool)
             for column, level in zip(new[first : first + BLOCK].T, levels.T, strict=True):
                 below &= column[:, None] <= level[None]
             levels = levels[~below.any(axis=0)]
-        known = set(rows)
         counts.append(total - len(levels))
     return float(REFERENCE**ideal.size) * np.array(counts) / total
+
+
+def _merged_costs(archive: Array, new: Array) -> Array:
+    costs = np.vstack([archive, new])
+    return costs[non_dominated(costs)]
 
 
 class Archive(NamedTuple):
@@ -97,11 +101,6 @@ def non_dominated(values: Array) -> Rows:
 def dominates(better: Array, worse: Array) -> Mask:
     """Whether costs (..., q) are nowhere larger than others and somewhere smaller."""
     return np.all(better <= worse, axis=-1) & np.any(better < worse, axis=-1)
-
-
-def merge(archive: Archive, new: Archive) -> Archive:
-    """Non-dominated points of both."""
-    return non_dominated_points(Archive(*map(np.vstack, zip(archive, new, strict=True))))
 
 
 def non_dominated_points(archive: Archive) -> Archive:
@@ -203,12 +202,6 @@ class Search(NamedTuple):
     def archive(self) -> Archive:
         """Non-dominated points of all generations."""
         return non_dominated_points(Archive(*map(np.vstack, zip(*self.generations, strict=True))))
-
-    @property
-    def archives(self) -> list[Archive]:
-        """The archive after every generation."""
-        none = Archive(*(part[:0] for part in self.generations[0]))
-        return list(accumulate(self.generations, merge, initial=none))[1:]
 
 
 def search(judge: Judge, low: Array, high: Array, population: int, generations: int, seed: int) -> Search:
