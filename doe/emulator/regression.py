@@ -11,6 +11,7 @@ Scikit-learn: machine learning in Python, J. Machine Learning Research 12 (2011)
 """
 
 from collections.abc import Callable
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -105,6 +106,12 @@ class Trended(Kernel):
         return kernel, np.moveaxis(gradient, 0, -1)
 
 
+@lru_cache(maxsize=16)
+def _even(parameters: int) -> Array:
+    """Candidates (n, parameters) that fill the unit box evenly."""
+    return np.asarray(qmc.Sobol(parameters, seed=1).random(CANDIDATES))
+
+
 class Search(NamedTuple):
     """Search for the mode of the posterior of the logarithms of hyperparameters (p,), an optimizer of scikit-learn's regressor.
 
@@ -122,8 +129,7 @@ class Search(NamedTuple):
 
     def __call__(self, loss: Callable, initial: Array, bounds: Array) -> tuple[Array, float]:
         """The mode and the negative logarithm of the posterior there, by that of the likelihood."""
-        even = qmc.Sobol(len(self.box), seed=1).random(CANDIDATES)
-        candidates = self.box[:, 0] + np.ptp(self.box, axis=1) * even
+        candidates = self.box[:, 0] + np.ptp(self.box, axis=1) * _even(len(self.box))
         values = np.array([loss(theta, eval_gradient=False) + self._penalty(theta)[0] for theta in candidates])
         noisy = candidates[:, -1] > self.box[-1].mean()
         starts = [candidates[side][values[side].argmin()] for side in (noisy, ~noisy)]

@@ -100,7 +100,10 @@ def non_dominated(values: Array) -> Rows:
 
 def dominates(better: Array, worse: Array) -> Mask:
     """Whether costs (..., q) are nowhere larger than others and somewhere smaller."""
-    return np.all(better <= worse, axis=-1) & np.any(better < worse, axis=-1)
+    # Column by column: a reduction along so short an axis takes four times as long.
+    columns = [(better[..., i], worse[..., i]) for i in range(better.shape[-1])]
+    never_larger = np.logical_and.reduce([ours <= theirs for ours, theirs in columns])
+    return np.asarray(never_larger & np.logical_or.reduce([ours < theirs for ours, theirs in columns]))
 
 
 def non_dominated_points(archive: Archive) -> Archive:
@@ -318,9 +321,10 @@ class Goals:
         """Largest costs (..., q) of responses that range from ``low`` to ``high`` (..., m): costs are convex."""
         columns = []
         for i in self.objectives:
-            least, most = low[..., i], high[..., i]
-            away = np.maximum(np.abs(least - self.target[i]), np.abs(most - self.target[i]))
-            columns.append({"min": most, "max": -least, "target": away}[self.kinds[i]])
+            if self.kinds[i] == "target":
+                columns.append(np.maximum(np.abs(low[..., i] - self.target[i]), np.abs(high[..., i] - self.target[i])))
+            else:
+                columns.append(high[..., i] if self.kinds[i] == "min" else -low[..., i])
         return np.stack(columns, axis=-1)
 
     def slopes(self, values: Array) -> Array:

@@ -375,8 +375,9 @@ def keeping(study: Problem, draws: Draws, point: Array, free: Rows, least_gains:
         counts = []
         for values in draws(study.coded(points)):
             costs, part_values = goals.costs(values), values[:, :-1]
-            sound = (costs[:, :-1] <= costs[:, -1:] - least_gains).all(axis=2)
-            counts.append((sound & (goals.violations(part_values, part_values) <= 0.0).all(axis=2)).sum(axis=1))
+            gained = [costs[:, :-1, i] <= costs[:, -1:, i] - least for i, least in enumerate(least_gains)]
+            kept = (goals.violations(part_values, part_values) <= 0.0).all(axis=2)
+            counts.append((np.logical_and.reduce(gained) & kept).sum(axis=1))
         return np.concatenate(counts)
 
     return counts_of
