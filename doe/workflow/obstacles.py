@@ -37,7 +37,7 @@ from doe.workflow.confirmation import (
     point_words,
     verdict_of,
 )
-from doe.workflow.front import tolerances_out_of_reach
+from doe.workflow.front import tolerance_box, tolerances_out_of_reach
 from doe.workflow.pick import SearchedPick, place_of, sides_of
 from doe.workflow.problem import Problem
 from doe.workflow.replication import standard_errors
@@ -194,7 +194,9 @@ def obstacles_of(
     missed = [limit for limit in every_limit(study, pick) if limit.verdict != "kept"]
     reachable = searched or front.violations is None or not missed
     tolerances = ""
-    if front.tolerance_violations is not None:
+    if front.tolerance_violations is not None and not (
+        widest and widest.allows(tolerance_box(study), study.known_tolerances)
+    ):
         tolerances = tolerances_out_of_reach(study, front.tolerance_violations)
     elif widest is not None and (missed or chains):
         tolerances = widest.warning if widest.any_width else widest.sentence

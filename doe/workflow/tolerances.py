@@ -14,7 +14,7 @@ from functools import cached_property
 
 import numpy as np
 
-from doe.pareto.manufacture import random_offsets
+from doe.pareto.manufacture import ToleranceBox, random_offsets
 from doe.pareto.search import Goals
 from doe.pareto.tolerance import RIM, Neighbourhood, Parts, WidestTolerances
 from doe.study_file.sections import Tolerances
@@ -116,6 +116,13 @@ class PickTolerances:
     def any_width(self) -> bool:
         """Whether parts may differ at all."""
         return bool((self.half_widths > 0.0).any())
+
+    def allows(self, box: ToleranceBox | None, half_widths: Mapping[str, float]) -> bool:
+        """Whether as many parts as the ``box`` requires keep all limits within the factors' own ``half_widths``."""
+        widest = dict(zip(self.factors, self.half_widths.tolist(), strict=True))
+        narrower = any(widest[name] < width * (1.0 - 1e-9) for name, width in half_widths.items())
+        enough = box is not None and box.kind == "quantile" and self.widest.probability >= box.quantile
+        return enough and not narrower
 
     @property
     def limiting_gain(self) -> str:
@@ -260,7 +267,7 @@ def _impossible(demands: Sequence[KeptGain]) -> str:
             return f"No tolerance is possible: the selected design has no gain in {demand.words} to keep; leave it out of [tolerances]."
         if least is not None and least > percent:
             return (
-                f"No tolerance is possible: at_least.{demand.response} = {least:g} exceeds the predicted gain of "
+                f"No tolerance is possible: at_least.{demand.response} = {least:g} exceeds the gain of "
                 f"{shown(percent, 3)} %; state less."
             )
     return ""
@@ -274,8 +281,8 @@ class PickParts:
     points, "baseline" and "pick" among them; they narrow the errors of the surfaces and say which gains are real. ``scene``: the bearing at the
     point, whose parts have grades; without it none are stated.
 
-    With ``neighbours``, about a pick of a search, the levels are those simulated at the pick and at the baseline. Parts may then
-    lie beyond the region by the factors' own tolerances, and ``search_draws`` draws the errors of the search.
+    The levels at the pick and at the baseline are those simulated, if ``confirmed``. Parts may lie beyond the region by the
+    factors' own tolerances. With ``neighbours``, about a pick of a search, ``search_draws`` draws the errors of the search.
     """
 
     study: Problem
@@ -330,9 +337,9 @@ class PickParts:
 
     @cached_property
     def ends(self) -> list[Array]:
-        """Responses (1, m) at the baseline and at the pick: simulated with neighbours, else predicted."""
-        if self.neighbours is not None and self.confirmed:
-            return [self.confirmed["baseline"].values[None], self.neighbours.values]
+        """Responses (1, m) at the baseline and at the pick: simulated if they are confirmed, else predicted."""
+        if self.confirmed:
+            return [self.confirmed[name].values[None] for name in ("baseline", "pick")]
         places = (self.study.baseline, self.point)
         return [predict_all(self.study.surfaces, self.study.coded(place)[None]) for place in places]
 
@@ -366,9 +373,9 @@ class PickParts:
         points = np.tile(self.point, (len(parts), 1))
         points[:, self.free_factors] = parts
         coded = self.study.coded(points)
-        values = predict_all(self.study.surfaces, coded)
+        values = predict_all(self.study.surfaces, coded) - self._centre_values + self.ends[1]
         if (here := self.neighbours) is not None:
-            values = values - self._centre_values + here.values + (coded - here.points) @ here.slopes[0]
+            values = values + (coded - here.points) @ here.slopes[0]
         return np.hstack([self.goals.costs(values), self.goals.violations(values, values)])
 
     def _tolerances(self, demands: Sequence[KeptGain], draws: Draws | None) -> PickTolerances:
@@ -388,7 +395,8 @@ class PickParts:
         no_violations = np.zeros((1, len(self.goals.limited)))
         half_widths = study.known_tolerances
         ratios = np.array([half_widths.get(name, np.nan) for name in study.factors])
-        low, high = _box(study, self.point, None if self.neighbours is None else np.nan_to_num(ratios))
+        extent, (low, high) = np.nan_to_num(ratios), study.ends.T
+        low, high = np.minimum(low, self.point - extent), np.maximum(high, self.point + extent)
         count = None if draws is None else keeping(study, draws, self.point, free, least - slack)
         parts = Parts(
             objectives=self._costs,
@@ -428,9 +436,3 @@ class PickParts:
             demand if demand.counts else replace(demand, parts_percent=tuple(range_of_parts))
             for demand, range_of_parts in zip(demands, ends.T.tolist(), strict=True)
         ]
-
-
-def _box(study: Problem, point: Array, extent: Array | None) -> tuple[Array, Array]:
-    """Ends (k,) of the region in which parts may lie, at least ``extent`` (k,) from the point, if stated."""
-    low, high = study.ends.T
-    return (low, high) if extent is None else (np.minimum(low, point - extent), np.maximum(high, point + extent))

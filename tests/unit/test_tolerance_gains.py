@@ -95,6 +95,30 @@ def test_unit_without_a_large_gain_all_real_ones_count(planes):
     assert "Not real: whirl deviation ratio 10.00 % less." in found.sentence
 
 
+def simulated(study, impact):
+    """Baseline and selected design as simulated, the latter with another impact than the planes predict."""
+    values = [LEVELS, np.array([impact, *(LEVELS + SLOPES @ PICK)[1:]])]
+    points = [study.baseline, study.actual(PICK)]
+    pair = (Confirmed(point, value, np.full(3, 1e-3), np.zeros(3)) for point, value in zip(points, values, strict=True))
+    return dict(zip(("baseline", "pick"), pair, strict=True))
+
+
+def test_closed_form_of_tolerances_about_a_simulated_design(planes):
+    """Closed form: where simulation has 16 % of the predicted 20 %, the slope of the surface reaches 5 % at 0.275 coded units."""
+    found = widest(planes, simulated(planes[0], 84.0), at_least={IMPACT: 5.0})
+    assert found.by_gain[IMPACT].predicted_percent == pytest.approx(16.0)
+    assert found.half_widths[1] == pytest.approx(0.275 / 0.9 * 0.05, rel=0.01)
+
+
+def test_parts_lie_beyond_the_region_by_the_tolerances_of_their_factors(planes):
+    """A design at a bound keeps the tolerance with which it is made, which would be zero within the region."""
+    study = planes[0]
+    found = widest(planes, point=study.reach * np.array([-1.0, -1.0, 0.0]), gains=[IMPACT])
+    own = study.known_tolerances
+    assert found.half_widths[:2] == pytest.approx(list(own.values())[:2])
+    assert found.widest.at_rim[:2].all() and found.half_widths[2] > list(own.values())[2]
+
+
 def test_closed_form_of_a_gain_at_least(planes):
     """Closed form: half of 20 % is kept up to -0.25, 5 % up to -0.125; of evenly spread parts 95 % where room + h = 0.95 (2 h)."""
     for settings, room in (
@@ -115,7 +139,7 @@ def test_closed_form_of_a_gain_at_least(planes):
 @pytest.mark.parametrize(
     ("settings", "point", "words"),
     [
-        ({"at_least": {LOSS: 5.0}}, PICK, "at_least.power_loss_W = 5 exceeds the predicted gain of 0.6 %; state less."),
+        ({"at_least": {LOSS: 5.0}}, PICK, "at_least.power_loss_W = 5 exceeds the gain of 0.6 %; state less."),
         ({"gains": [LOSS]}, -PICK, "the selected design has no gain in power loss to keep; leave it out of [tolerances]."),
         ({}, -PICK, "No tolerances follow, because the selected design has no gain to keep and no response has a limit."),
     ],

@@ -216,11 +216,12 @@ def _clearances(summary: Summary) -> list[Block]:
         meaning += " Clearances in operation include the effects of fits, heat and rotation."
         meaning += least_words(summary)
     widest = SENTENCE_END.split(summary.tolerances_sentence or "")
+    too_fine = summary.tolerances_warning or ""
     return [
         replace(_selected(summary, inputs), note=meaning),
         Paragraph(summary.clearance_class),
         *_temperatures(summary.confirmation),
-        Paragraph("" if summary.obstacles.tolerances else summary.tolerances_warning or "", "warning"),
+        Paragraph("" if too_fine in summary.obstacles.tolerances else too_fine, "warning"),
         Paragraph(widest[0]),
         Paragraph(" ".join(widest[1:2]), detail=Detail.ALL),
     ]
