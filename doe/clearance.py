@@ -9,7 +9,7 @@ import socket
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import partial
 from itertools import islice
 from pathlib import Path
@@ -24,6 +24,7 @@ from rbdyn.base.arrays import Array, Whole
 from rbdyn.base.faults import InputError, RunError
 from rbdyn.base.files import code_version, run_key
 from rbdyn.base.notes import verdict
+from rbdyn.base.records import Record
 from rbdyn.dynamics.figures import FIGURES
 from rbdyn.result import SimulationResult, arrays_of
 from rbdyn.scene import Scene
@@ -63,8 +64,7 @@ def undeclared(data: Mapping[str, Any], scene: Scene) -> dict[str, Any]:
     return tables
 
 
-@dataclass(frozen=True)
-class Simulations:
+class Simulations(Record):
     """Simulations of scenes, each once, with their results in ``store``.
 
     ``workers``: threads, by default all processors; ``scheduler``: address of a cluster to run on instead. ``retry``:

@@ -7,7 +7,7 @@ those with one scene are one, so that neither the order of the tables nor a poin
 import math
 from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -20,7 +20,7 @@ from doe.study_file.study import PointResponse
 from rbdyn.base.arrays import Array, Whole
 from rbdyn.base.faults import InputError, RunError, key_path
 from rbdyn.base.notes import Notes, merged
-from rbdyn.base.records import finite
+from rbdyn.base.records import Record, finite
 from rbdyn.dynamics.figures import FIGURES
 from rbdyn.result import Quantity, SimulationResult, arrays_of
 from rbdyn.scene import Scene
@@ -75,8 +75,7 @@ class Rule(NamedTuple):
         return worst._replace(value=self.value(worst.value, at_worst)), odds
 
 
-@dataclass(frozen=True)
-class Duty:
+class Duty(Record):
     """Shares of the time and overrides by point, in the order of the names; rules of the responses by name of their figure.
 
     ``origins``: from which state points begin, by name, of those that state it. ``limits``: point and figure of each response that is a limit at a point. ``groups``: names of points, those with one scene
@@ -208,8 +207,7 @@ def _entry(tables: Any, path: Sequence[str]) -> Any:
     return tables
 
 
-@dataclass(frozen=True)
-class DutyScenes:
+class DutyScenes(Record):
     """A run over a duty: a scene by name of each point.
 
     ``baseline``: scenes of the original design by point, whose figures those of a worst_relative response are divided by; empty
@@ -276,8 +274,7 @@ def main_scene(run: Run) -> Scene:
     return run if isinstance(run, Scene) else run.main
 
 
-@dataclass(frozen=True)
-class DutyResult:
+class DutyResult(Record):
     """Results of a run by point, in the order of the names, and of the baseline if its figures count.
 
     ``groups``: names of points, those with one scene together.

@@ -66,8 +66,7 @@ GROWTH, MOST_MOVES = 0.5, 3  # of the range a move; moves of a search
 FUNCTIONS = 64  # drawn for that chance
 
 
-@dataclass(frozen=True)
-class Plan:
+class Plan(Record):
     """How a search goes: ``budget`` of runs, those of the design and the fresh ones included; runs a ``batch``; ``seed``.
 
     A run has from ``least`` to ``most`` replicates, a fresh one ``usual``, and the ``pick`` is made by that rule. Two replicates

@@ -15,7 +15,7 @@ Source: Chase and Greenwood, Design issues in mechanical tolerance analysis (198
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from math import exp, inf, sqrt
 
@@ -43,6 +43,7 @@ from doe.dimension_chain.links import (
 )
 from doe.dimension_chain.yields import Assemblies, closing_moments, draw, exact_shares, standard_error
 from rbdyn.base.faults import MethodError
+from rbdyn.base.records import Record
 from rbdyn.properties.tolerances import grade_tolerances, tolerance_unit
 
 SAMPLES = 100_000  # assemblies for a yield in a chain with functions
@@ -56,8 +57,7 @@ Grades = Mapping[str, str]
 SPAN = 700.0  # of the logarithm of the multiplier, the range of a float
 
 
-@dataclass(frozen=True)
-class Allocation:
+class Allocation(Record):
     """The search for tolerances of a valid chain."""
 
     chain: Chain

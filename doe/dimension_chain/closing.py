@@ -14,7 +14,6 @@ import ast
 import json
 import operator
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from functools import cache, reduce
 from itertools import product
 from math import pi, sqrt
@@ -25,6 +24,7 @@ import numpy as np
 from doe.dimension_chain.links import DIGITS, Interval, Link, Mode, Part, PressFit
 from rbdyn.base.arrays import Array
 from rbdyn.base.faults import MethodError
+from rbdyn.base.records import Record
 from rbdyn.mounting.rings import Ring, interface_pressure
 from rbdyn.properties.materials import Material
 
@@ -129,8 +129,7 @@ class NoValueError(MethodError):
     """Sizes at which a function has no finite value; the message names the link, the sizes and the fix."""
 
 
-@dataclass(frozen=True)
-class Function:
+class Function(Record):
     """A link that follows from others, and its value at their sizes."""
 
     link: Link
@@ -154,8 +153,7 @@ class Function:
         )
 
 
-@dataclass(frozen=True)
-class ClosingFunction:
+class ClosingFunction(Record):
     """Sum of coefficient times part and of coefficient times function, in their order.
 
     ``arguments``: names of the parts that functions use; without functions the chain is linear.

@@ -10,13 +10,14 @@ nominal that is moved to the step next to its place.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import ceil, floor
 from typing import Annotated, Literal
 
 from pydantic import Field
 
 from rbdyn.base.faults import MethodError, NonNegative, Positive, Strict
+from rbdyn.base.records import Record
 from rbdyn.properties.tolerances import SURFACES, fit_limits, grade_tolerances, position_limits, ring_limits
 
 Distribution = Literal["normal", "truncated_normal", "uniform", "triangular"]
@@ -250,8 +251,7 @@ class Chain(Strict):
         return all(link.has_deviations for link in self.free)
 
 
-@dataclass(frozen=True)
-class Part:
+class Part(Record):
     """A part with all its sizes, mm; ``mean_mm`` is a deviation from the nominal, ``moved_mm`` the shift of the nominal.
 
     ``origin``: stated deviations, allocated ones, or the growth of another part by temperature. ``fit``: code that states them.

@@ -1,7 +1,6 @@
 """Solution of a dimension chain: intervals, yields, contributions, allocation and selective assembly in one record."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import partial
 from math import sqrt
 from typing import NamedTuple
@@ -270,8 +269,7 @@ def _solved(search: Allocation, samples: int, seed: int) -> ChainResult:
     )
 
 
-@dataclass(frozen=True)
-class _Verdict:
+class _Verdict(Record):
     """Status of judged parts; for refused ones also the miss, the remedy and the nearest parts that meet the limits."""
 
     status: str

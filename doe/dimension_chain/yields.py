@@ -16,7 +16,7 @@ import os
 from bisect import bisect_left
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 from math import exp, pi, sqrt
 from typing import Any
@@ -120,8 +120,7 @@ Draws = dict[Distribution, tuple[Array, float, float]]
 Laws = dict[str, Distribution | None]  # by key; None: each part's own
 
 
-@dataclass(frozen=True)
-class Assemblies:
+class Assemblies(Record):
     """Random assemblies: numbers below and above the limits, by the law of the parts.
 
     ``values`` (samples,): closing links, mm, with each part's own distribution ("as_given").

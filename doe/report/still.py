@@ -9,11 +9,13 @@ import io
 import json
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from xml.etree import ElementTree
+
+from rbdyn.base.records import Record
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -46,8 +48,7 @@ STYLE: dict[Any, Any] = {
 }  # fmt: skip
 
 
-@dataclass(frozen=True)
-class Still:
+class Still(Record):
     """A picture of one pair of axes.
 
     words : what it shows, for readers who cannot see it; no two pictures of a page have the same

@@ -26,11 +26,11 @@ from pydantic import TypeAdapter
 
 from doe.running.store import STORE, Failure, Point, RunResult, Sound, StoppedError, Store
 from rbdyn.base.faults import InputError, RunError
+from rbdyn.base.records import Record
 from rbdyn.base.words import NOTABLE_S, Notice, counted, estimate
 
 
-@dataclass(frozen=True)
-class RunOutcome:
+class RunOutcome(Record):
     """The outcome of a run: its result or the cause of its failure, and where it ran, if not in this process.
 
     A lost run, unlike a failed one, is not stored: the next resumption runs it.
@@ -52,8 +52,7 @@ class RunOutcome:
 Progress = Callable[[int, int], None]
 
 
-@dataclass(frozen=True)
-class Ledger:
+class Ledger(Record):
     """Entries of an engine on its points: ``begin`` notes a start, ``keep`` stores an outcome, ``give`` hands it over.
 
     All but ``give`` may be called in any thread.

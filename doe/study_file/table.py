@@ -4,7 +4,7 @@ A table has a column for each factor and response, and optional ones of errors, 
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +12,7 @@ import numpy as np
 from rbdyn.base.arrays import Array, Whole
 from rbdyn.base.faults import LONGEST_NAME, InputError, one_line, refuse
 from rbdyn.base.notes import Note, Notes
+from rbdyn.base.records import Record
 from rbdyn.base.tables.sheet import UNKNOWN, InputTable, Limits, listed, quoted, read_sheet
 
 # Fourth powers of larger values overflow; larger labels and counts are not exact in floating point.
@@ -24,8 +25,7 @@ STATUS, DONE, FAILED = "status", "done", "failed"
 MOST_RUNS = 5000
 
 
-@dataclass(frozen=True)
-class Table:
+class Table(Record):
     """Factor values (n, k), responses (n, m) and their 95 % half widths (n, m; NaN if unknown).
 
     A response without a value is NaN. ``replicates`` (n,) or (n, m) of the errors (0: unknown) and ``block`` (n,) of each run

@@ -200,8 +200,7 @@ class PairWorth(NamedTuple):
     interval: Interval
 
 
-@dataclass(frozen=True)
-class DecisiveInputs:
+class DecisiveInputs(Record):
     """Unknown inputs by their worth.
 
     inputs : the best first

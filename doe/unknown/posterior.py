@@ -255,8 +255,7 @@ class Level(NamedTuple):
     log_likelihood: Array
 
 
-@dataclass(frozen=True)
-class Sampled:
+class Sampled(Record):
     """Particles at every power, the last of which is 1, and the logarithm of the evidence, the prior mean of the likelihood."""
 
     levels: list[Level]

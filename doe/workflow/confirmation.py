@@ -5,7 +5,7 @@ Intervals are Student's at the degrees of freedom of the errors. A limit is kept
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
@@ -50,16 +50,14 @@ def point_words(name: str) -> str:
     }.get(name, name.replace("_", " "))
 
 
-@dataclass(frozen=True)
-class Choice:
+class Choice(Record):
     """A point (k,) in factor units, at the resolution of the drawing, and the reason for its choice."""
 
     point: Array
     reason: str
 
 
-@dataclass(frozen=True)
-class Confirmed:
+class Confirmed(Record):
     """Simulated responses (m,) at a point, with 95 % statistical and numerical half-widths.
 
     Intervals use `error`: the root sum square of both half-widths, as of independent errors. ``freedom`` (m,): degrees

@@ -2,7 +2,6 @@
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -135,8 +134,7 @@ class Calibration(Record, kw_only=True):
     evidence: "Evidence | None" = outside_json(default=None)
 
 
-@dataclass(frozen=True)
-class Evidence:
+class Evidence(Record):
     """What a calibration rests on.
 
     ``case``: the scene with its unknown inputs; ``inputs``: the targets; ``screened``: inputs kept at their values.

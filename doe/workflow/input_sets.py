@@ -2,7 +2,7 @@
 
 import copy
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
@@ -33,6 +33,7 @@ from rbdyn.base.faults import (
 )
 from rbdyn.base.files import digest_of, read_json
 from rbdyn.base.notes import Note, Notes
+from rbdyn.base.records import Record
 from rbdyn.base.tables.sheet import read_sheet
 from rbdyn.base.words import shown
 from rbdyn.scene import Scene, rollers_only
@@ -47,8 +48,7 @@ CHECKS = 16  # input sets that are checked before anything runs
 ROUND_SEEDS = 10_000  # of further replicates of the same input sets
 
 
-@dataclass(frozen=True)
-class Sets:
+class Sets(Record):
     """Input sets with results, and the failures of the others.
 
     ``places`` (n,) in the plan, quantiles (n, d) and values of the inputs, outputs (n, m). ``impossible``: why a scene could not
@@ -85,8 +85,7 @@ class Sets:
         )
 
 
-@dataclass(frozen=True)
-class Case:
+class Case(Record):
     """A scene file with its unknown inputs, ``every`` one, and the ``outputs`` that are studied.
 
     ``sample``: columns of a posterior sample by key, with the ``doubt`` about it in a sentence. ``remarks``: sentences on

@@ -1,7 +1,7 @@
 """The answer of the robust judgement: its record, shaped like its JSON, and its sentences."""
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import Any
 
 from doe.running.store import Failure
@@ -72,8 +72,7 @@ class Pair(Record):
     worth_interval: Interval
 
 
-@dataclass(frozen=True)
-class Decision:
+class Decision(Record):
     """All inputs by worth, and whether the first of them is surely the first: the verdict, and the ``rivals`` by key, the best first.
 
     ``needed``: about how many pairs of runs decide between them.

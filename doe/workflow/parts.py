@@ -9,7 +9,6 @@ those of the scene, and their grade is the widest that all of them may have toge
 
 import math
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
 from typing import NamedTuple
 
 from doe.dimension_chain import Chain, chain_from, grade_tolerances
@@ -211,8 +210,7 @@ class Made(Record):
     chain: str
 
 
-@dataclass(frozen=True)
-class SharedTolerance:
+class SharedTolerance(Record):
     """``parts`` that share a tolerance in the worst case, and the widths [mm] ``taken`` by graded parts."""
 
     parts: tuple[Part, ...]

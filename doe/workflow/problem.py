@@ -34,8 +34,7 @@ if TYPE_CHECKING:
     from doe.response_surface import Surface
 
 
-@dataclass(frozen=True)
-class RunPlan:
+class RunPlan(Record):
     """The design runs before their simulation: design, actual factors (n, k), and by run the scene, label and factors."""
 
     design: Design

@@ -6,7 +6,6 @@ Further columns are named by keys of the scene, such as operation.inner_speed_rp
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -17,6 +16,7 @@ from doe.study_file.table import gap_notes
 from rbdyn.base.arrays import Array
 from rbdyn.base.faults import InputError, Strict, refuse
 from rbdyn.base.notes import Notes
+from rbdyn.base.records import Record
 from rbdyn.base.tables.sheet import UNKNOWN, InputColumn, InputTable, Limits, listed, read_sheet
 from rbdyn.base.words import counted, quantity
 from rbdyn.dynamics.figures import FIGURES, Figure
@@ -38,8 +38,7 @@ FEWEST, MOST_ROWS, MOST_CONDITIONS = 3, 1000, 200
 ROW, ABSENT = re.compile(r" in row (\d+)"), re.compile(r": is missing;")
 
 
-@dataclass(frozen=True)
-class Row:
+class Row(Record):
     """A row: its number in the file, values of scene keys, and measured values by output.
 
     ``sds``: standard deviations by output; None stands for the scatter of ``turns`` shaft turns. ``hold``: whether the row
@@ -54,8 +53,7 @@ class Row:
     hold: bool
 
 
-@dataclass(frozen=True)
-class Rig:
+class Rig(Record):
     """A rig's table: its rows, the scene keys and the measured outputs among its columns, and notes on how it was read.
 
     ``accuracies``: by output, the standard deviation of an offset of all its rows, as a share."""
@@ -95,8 +93,7 @@ def read_rig(path: Path) -> Rig:
     return rig
 
 
-@dataclass(frozen=True)
-class _Cells:
+class _Cells(Record):
     """Columns of a rig's table: all of them as texts, ``numbers`` (NaN where unknown), and values of scene ``keys``."""
 
     path: Path

@@ -40,12 +40,12 @@ from doe.workflow.problem import Problem
 from rbdyn.base.arrays import Array, Whole, one_thread
 from rbdyn.base.estimate import wilson
 from rbdyn.base.faults import InputError, key_path, refuse, set_key
+from rbdyn.base.records import Record
 from rbdyn.scene.unknown import Input, UnknownInput, is_number
 from rbdyn.verdict.orbits import BLOCK_TURNS
 
 
-@dataclass(frozen=True)
-class Pairs:
+class Pairs(Record):
     """p designs at the same n input sets.
 
     ``places`` (n,) of the sets in the plan, their quantiles (n, d), and the outputs (p, n, m).

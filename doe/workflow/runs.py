@@ -1,7 +1,7 @@
 """Runs of a study: those of its design, simulated with others in place of failed ones, or those of a table."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from operator import itemgetter
 from pathlib import Path
 from statistics import fmean
@@ -31,8 +31,7 @@ from rbdyn.base.words import are, counted, with_error
 REPLACED = 3
 
 
-@dataclass(frozen=True)
-class Runs:
+class Runs(Record):
     """Design runs: coded and actual factors (n, k), responses (n, m) and their 95 % half-widths.
 
     ``notes``: distinct warnings of the simulations, or how a table was read; its responses without a value are NaN. ``replicates``, (n,) or (n, m), count the independent

@@ -25,7 +25,7 @@ from rbdyn.base.arrays import Array
 from rbdyn.base.faults import LONGEST_NAME, InputError, key_path, one_line, put_key, read_toml, refuse, set_key
 from rbdyn.base.files import digest_of
 from rbdyn.base.notes import Notes
-from rbdyn.base.records import finite
+from rbdyn.base.records import Record, finite
 from rbdyn.base.tables.sheet import InputTable, listed, read_sheet, sheet_of_frame
 from rbdyn.draft.text import tables_of
 from rbdyn.result import SimulationResult, arrays_of
@@ -45,8 +45,7 @@ SHORT = {"replicates": "numerics.replicates", "seed": "numerics.seed"}
 FILES_KEPT = 64
 
 
-@dataclass(frozen=True)
-class SceneRow:
+class SceneRow(Record):
     """A row of a table: its ``number`` from 1, its ``name``, ``values`` by scene key, and faults of its cells.
 
     ``file``: its scene, or ``designation``: the bearing of the catalogue that it begins with; the base of the table without both.
@@ -60,8 +59,7 @@ class SceneRow:
     faults: Sequence[str] = ()
 
 
-@dataclass(frozen=True)
-class SceneTable:
+class SceneTable(Record):
     """A table of scenes with the ``base`` file of rows without one, and ``overrides`` of all rows."""
 
     path: Path
@@ -182,8 +180,7 @@ BATCH = 256
 ROWS = "rows"
 
 
-@dataclass(frozen=True)
-class RowFigures:
+class RowFigures(Record):
     """Figures of a run: their ``names``, and ``numbers`` (3, n): values, statistical and numerical 95 % half-widths, NaN if unknown."""
 
     names: tuple[str, ...]

@@ -7,7 +7,7 @@ import json
 import time
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from datetime import UTC, datetime
 from itertools import product
 from pathlib import Path
@@ -25,7 +25,7 @@ from rbdyn.base.digests import source_digest
 from rbdyn.base.faults import InputError, read_bytes, read_toml
 from rbdyn.base.files import code_version, digest_of, intact, read_json, versions
 from rbdyn.base.identity import Identity, identity_of
-from rbdyn.base.records import plain
+from rbdyn.base.records import Record, plain
 from rbdyn.base.tables.workbook import split_path
 from rbdyn.scene import Scene
 
@@ -184,8 +184,7 @@ FORMAT = "doe.status/1"
 SCENE_FOLDERS = ("{}_uncertainty", "{}_calibration")
 
 
-@dataclass(frozen=True)
-class Content:
+class Content(Record):
     """Contents of a store: results and failures of points, current runs, ended runs, and agendas.
 
     The newest agenda is the last; each comes with whether its process lives.

@@ -12,7 +12,7 @@ scale of each component, and no relative one. Their norms differ, so compare the
 import time
 import warnings
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -37,8 +37,7 @@ BUDGET_PER_TURN = 4_000_000
 NO_RELATIVE_TOLERANCE = 2.3e-14
 
 
-@dataclass(frozen=True)
-class Stretch:
+class Stretch(Record):
     """From the state ``start`` (n,) over so many shaft turns; ``scale`` (n,): scale of the errors of each component."""
 
     scene: Scene
@@ -345,8 +344,7 @@ POINTS = 41
 Curve = Sequence[tuple[float, float]]  # (error, time) pairs, all positive
 
 
-@dataclass(frozen=True)
-class Speedup:
+class Speedup(Record):
     """Ratio of times: geometric mean, least and greatest over the errors from ``low`` to ``high``."""
 
     low: float

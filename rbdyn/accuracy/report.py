@@ -4,14 +4,14 @@ import logging
 import platform
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, field
 from pathlib import Path
 from typing import Any, TypeVar
 
 from rbdyn.base import terminal
 from rbdyn.base.blocks import Block, Detail, Paragraph, Table
 from rbdyn.base.files import versions, write_json
-from rbdyn.base.records import save_table
+from rbdyn.base.records import Record, save_table
 from rbdyn.base.words import NOTABLE_S, counted, estimate
 from rbdyn.compiled.kernel import COMPILING
 from rbdyn.dynamics.ensemble import LOOK_S, Reporter
@@ -22,8 +22,7 @@ LOGGER = logging.getLogger("rbdyn.accuracy")
 KEYS = ("numerics.turns", "numerics.replicates")
 
 
-@dataclass(frozen=True)
-class Report:
+class Report(Record):
     """Outcome of a study: ``record`` becomes ``stem.json``, each sheet a CSV, each picture a PNG; ``failed``: the
     command ends with an error."""
 

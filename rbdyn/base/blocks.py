@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, Literal, Self, TypeVar
 
 from rbdyn.base.notes import DANGER, Note, Notes, condensed, of_level, ranked, verdict
-from rbdyn.base.records import plain, save_table
+from rbdyn.base.records import Record, plain, save_table
 from rbdyn.base.words import label, quantity, shown, with_error
 
 if TYPE_CHECKING:
@@ -36,8 +36,7 @@ Role = Literal["", "statement", "danger", "warning", "small"]
 ALARMS = {"danger": "Danger", "warning": "Warning"}
 
 
-@dataclass(frozen=True)
-class Paragraph:
+class Paragraph(Record):
     """Sentences; a "statement" is good news, a "danger" or "warning" bad news or an open verdict, "small" is small print."""
 
     text: str
@@ -45,8 +44,7 @@ class Paragraph:
     detail: Detail = Detail.LEAST
 
 
-@dataclass(frozen=True)
-class Verdict:
+class Verdict(Record):
     """Every danger among the notes of a result, or, where dangers are ``judged``, that there is none; renderings begin with it.
 
     ``good``: what is well, before the words that there is no danger; ``warnings``: number of those that are none of the notes.
@@ -67,8 +65,7 @@ class Verdict:
         return [Paragraph(" ".join(filter(None, [self.good, verdict(self.notes, self.warnings)])))]
 
 
-@dataclass(frozen=True)
-class Remarks:
+class Remarks(Record):
     """The notes of a result that are no dangers, the worst first; below full detail the first of them, merged.
 
     ``gathers``: whether a terminal shows the warnings of all other blocks among them.
@@ -84,24 +81,21 @@ class Remarks:
         return [note for note in ranked(self.notes) if note.level != DANGER]
 
 
-@dataclass(frozen=True)
-class Heading:
+class Heading(Record):
     """A heading inside a section."""
 
     text: str
     detail: Detail = Detail.LEAST
 
 
-@dataclass(frozen=True)
-class Bullets:
+class Bullets(Record):
     """Sentences, one a line."""
 
     items: Sequence[str]
     detail: Detail = Detail.LEAST
 
 
-@dataclass(frozen=True)
-class Table:
+class Table(Record):
     """A table whose first column names the row; a ``folded`` one opens on demand, a ``sortable`` one sorts by any column.
 
     ``text_columns``: further columns that hold text rather than numbers. ``tiles``: headings of columns without a unit; where they
@@ -129,8 +123,7 @@ class Table:
         )
 
 
-@dataclass(frozen=True)
-class Figures:
+class Figures(Record):
     """Still pictures next to each other with one caption; left out where a rendering has no pictures.
 
     pictures : SVG, or functions that draw it, which only a page calls
@@ -142,8 +135,7 @@ class Figures:
     detail: Detail = Detail.LEAST
 
 
-@dataclass(frozen=True)
-class Widget:
+class Widget(Record):
     """Place of an interactive picture; left out where a rendering has no scripts."""
 
     name: str
@@ -153,8 +145,7 @@ class Widget:
 Block = Paragraph | Verdict | Remarks | Heading | Bullets | Table | Figures | Widget
 
 
-@dataclass(frozen=True)
-class Section:
+class Section(Record):
     """Part of a report; ``key`` is its anchor. Empty blocks are left out of the report."""
 
     key: str

@@ -5,7 +5,6 @@ a table of samples and the figures of the motion are written.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
@@ -14,7 +13,7 @@ from rbdyn.base.blocks import Block, Detail, Paragraph, Table, with_notes
 from rbdyn.base.faults import refuse
 from rbdyn.base.files import versions, write_json
 from rbdyn.base.notes import DANGER, Note, Notes, of_level
-from rbdyn.base.records import plain, save_table
+from rbdyn.base.records import Record, plain, save_table
 from rbdyn.base.words import counted, quantity, shown, with_error
 from rbdyn.result import SimulationResult
 from rbdyn.scene import Scene
@@ -34,8 +33,7 @@ PEAKS = 5
 LOADS = {"pocket": "pocket_load", "dry_land": "land_load", "outer_race": "outer_load", "inner_race": "inner_load"}
 
 
-@dataclass(frozen=True)
-class Request:
+class Request(Record):
     """What to show: the result, its file, its scene, and how many turns of which replicate, from 0."""
 
     result: SimulationResult

@@ -19,6 +19,7 @@ import numpy as np
 from rbdyn.base.arrays import Array, Whole
 from rbdyn.base.blocks import Column, Sheet, frame_of
 from rbdyn.base.faults import LONGEST_NAME, one_line, refuse
+from rbdyn.base.records import Record
 from rbdyn.base.words import Brief, Figure, Notice
 from rbdyn.contact.film_thickness import hertz_pressure
 from rbdyn.dynamics.ensemble import Pace, Stop, log
@@ -370,8 +371,7 @@ def spectrum(history: History, values: Array) -> Spectrum:
     return Spectrum(frequency, np.sqrt(2.0 * power))
 
 
-@dataclass(frozen=True)
-class Profile:
+class Profile(Record):
     """A quantity of all rollers against azimuth: mean, 5 % and 95 % quantile in each bin, (bins,); NaN in empty bins.
 
     ``azimuth``: bin centres from the load direction, in [-pi, pi).

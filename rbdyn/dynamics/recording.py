@@ -19,6 +19,7 @@ import numpy as np
 from rbdyn.base.arrays import Array, Whole
 from rbdyn.base.faults import RunError
 from rbdyn.base.notes import Note, Notes
+from rbdyn.base.records import Record
 from rbdyn.base.words import Notice
 from rbdyn.dynamics.ensemble import Outcome, Pace, Reporter, Stop, in_turn, run_all, threads_of
 from rbdyn.dynamics.forces.equations import RollerBearing, mechanical_energy
@@ -42,8 +43,7 @@ SPEED_SUMS, PLACE_SUMS = (
 BATCH_TURNS = 1.0
 
 
-@dataclass(frozen=True)
-class Batches:
+class Batches(Record):
     """How a run is cut: ends of the batches of the warm-up, length of all others [shaft turns], batches of an impact window."""
 
     warm_up: Array
@@ -291,8 +291,7 @@ class Stage(NamedTuple):
     lengthened: bool = False
 
 
-@dataclass(frozen=True)
-class Ensemble:
+class Ensemble(Record):
     """Replicates and companions as they are counted, and the ``plan`` by which companions are integrated.
 
     ``since``: batch from which they would count if they had settled at once; ``fault``: why companions that were asked for are missing;

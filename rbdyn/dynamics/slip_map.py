@@ -8,7 +8,6 @@ import itertools
 import time
 from collections import Counter
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
@@ -152,8 +151,7 @@ class SlipMap(OverPoints, Record):
         return np.array(values).reshape(len(self.rows), len(self.columns))
 
 
-@dataclass(frozen=True)
-class Job:
+class Job(Record):
     """A run to make: a replicate of a point, or a companion of it."""
 
     series: "Series"

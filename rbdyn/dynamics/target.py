@@ -11,7 +11,7 @@ import math
 import time
 from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -19,6 +19,7 @@ import numpy as np
 from rbdyn.base.arrays import Array
 from rbdyn.base.faults import LONGEST_NAME, InputError, one_line
 from rbdyn.base.notes import Note
+from rbdyn.base.records import Record
 from rbdyn.base.words import NORMAL, Notice, counted
 from rbdyn.dynamics.ensemble import Reporter, Stop, plan_of, threads_of
 from rbdyn.dynamics.figures import FIGURES
@@ -90,8 +91,7 @@ class Choice(NamedTuple):
         return with_numerics(scene, rtol=self.rtol, turns=self.turns, replicates=self.replicates, companion=True)
 
 
-@dataclass(frozen=True)
-class Model:
+class Model(Record):
     """Errors and costs of a scene. Relative to the figures, by name: ``scatter``, standard error of the mean of one turn, and
     ``bias``, bound of the bias over rtol. ``ladder``: tolerances, falling, with their power gaps and right-hand sides a turn.
     """

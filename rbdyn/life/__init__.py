@@ -15,7 +15,6 @@ P_m gives the same damage wherever each life is (C/P_i)^p.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any, Literal
 
 from rbdyn.base.blocks import Sheet, columns_of
@@ -34,8 +33,7 @@ def turning_rings(inner_speed: float, outer_speed: float) -> Turning:
     return "outer" if inner_speed == 0.0 else "both"
 
 
-@dataclass(frozen=True)
-class Life:
+class Life(Record):
     """Life that 90 % of bearings, or rows, reach.
 
     ``million_turns``: L10 in 1e6 turns of the inner ring against the outer ring; infinite without a load. ``inner_load,
@@ -72,8 +70,7 @@ BALL_EXPONENT, ROLLER_EXPONENT = 3.0, 10.0 / 3.0
 SHARE_ROUNDING = 1e-6
 
 
-@dataclass(frozen=True)
-class LoadCase:
+class LoadCase(Record):
     """A point of a duty: share of the time, speed of inner against outer ring [rad/s], equivalent load P [N], life there."""
 
     share: float
@@ -87,8 +84,7 @@ class LoadCase:
         return self.life.hours(self.speed)
 
 
-@dataclass(frozen=True)
-class DutyLife:
+class DutyLife(Record):
     """Life over a duty that 90 % of bearings reach.
 
     ``hours``, ``million_turns``: infinite without damage; the turns are those of the inner ring against the outer ring.

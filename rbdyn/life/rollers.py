@@ -12,7 +12,6 @@ heat of ISO 15312. Comments mark constants from memory. SKF's model is not a mea
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -100,7 +99,6 @@ def minimum_loads(
     }
 
 
-@dataclass(frozen=True)
 class ReferenceLife(Life):
     """Reference rating life L10r; ``equivalent_load``: the radial load P_ref of equal life by ISO 281 [N]."""
 

@@ -19,6 +19,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rbdyn.base.faults import MethodError
+from rbdyn.base.records import Record
 from rbdyn.properties.materials import Material
 
 
@@ -123,8 +124,7 @@ def loosening_speed(inner: Ring, outer: Ring, interference: float) -> float:
     return math.sqrt(at_rest / opening) if opening > 0.0 else math.inf
 
 
-@dataclass(frozen=True)
-class MountedRings:
+class MountedRings(Record):
     """Shaft, both rings and housing at their temperatures and speeds; interferences are diametral [m], positive for a tight fit.
 
     The outer radius of ``inner_ring`` and the inner radius of ``outer_ring`` are those of the raceways. Each ring has its own
@@ -162,8 +162,7 @@ class MountedRings:
         return loosening_speed(self.shaft, self.inner_ring, self.inner_interference)
 
 
-@dataclass(frozen=True)
-class MountedClearance:
+class MountedClearance(Record):
     """Diametral clearance and its changes [m], negative for a reduction.
 
     ``operating`` is the sum of ``initial`` and the four changes. Fits have the pressures [Pa] after temperature and rotation.

@@ -11,13 +11,13 @@ The page is one HTML file that fetches nothing and is readable on paper.
 import html
 import json
 import math
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from rbdyn.base.arrays import Array
+from rbdyn.base.records import Record
 
 if TYPE_CHECKING:
     from rbdyn.dynamics.motion import History
@@ -51,8 +51,7 @@ class Reference(NamedTuple):
     v: float
 
 
-@dataclass(frozen=True)
-class Drawing:
+class Drawing(Record):
     """Sizes [mm] and motion: (frames,) or (frames, rollers); deviations in mm, angles in rad."""
 
     rollers: int

@@ -7,11 +7,11 @@ import math
 import re
 import xml.etree.ElementTree as Tree
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
 from rbdyn.base.faults import LONGEST_NAME, InputError, one_line, read_bytes
+from rbdyn.base.records import Record
 from rbdyn.base.tables.sheet import is_number
 from rbdyn.properties.oils import GRADES
 
@@ -67,8 +67,7 @@ PLACES = re.compile(
 Attributes = Mapping[str, tuple[str, float | str | None]]
 
 
-@dataclass(frozen=True)
-class Component:
+class Component(Record):
     """A component of a file: its ``number`` there, ``name``, ``kind``, and each attribute with its unit and text."""
 
     number: str

@@ -8,7 +8,6 @@ point of the scan, and a note states an optimum at an end of the range.
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -17,6 +16,7 @@ from scipy.optimize import minimize_scalar
 from rbdyn.base.arrays import Array
 from rbdyn.base.faults import MethodError, validated
 from rbdyn.base.notes import Note, Notes
+from rbdyn.base.records import Record
 from rbdyn.life import turning_rings
 from rbdyn.quasistatic.result import Rating, overload, pressures, reference_capacities, solution_life
 from rbdyn.quasistatic.row.equilibrium import Solution, solve
@@ -38,8 +38,7 @@ class Case(NamedTuple):
     constraint: Array
 
 
-@dataclass(frozen=True)
-class Point:
+class Point(Record):
     """One equilibrium of a scan, at one ``value`` of the variable: largest Hertz pressure [Pa] and L10 [1e6 turns].
 
     Both are NaN without an equilibrium.
@@ -52,8 +51,7 @@ class Point:
     million_turns: float = math.nan
 
 
-@dataclass(frozen=True)
-class Scan:
+class Scan(Record):
     """A scan over preload or clearance and its two optima; ``notes`` state where they differ or are at an end."""
 
     points: tuple[Point, ...]

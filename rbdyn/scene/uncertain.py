@@ -7,7 +7,6 @@ reasons. Neither changes a run: they describe the scenes around it.
 import functools
 import tomllib
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from importlib import resources
 from typing import Annotated, Any, Literal, Self
 
@@ -26,6 +25,7 @@ from rbdyn.base.faults import (
     one_line,
     or_refuse,
 )
+from rbdyn.base.records import Record
 
 # Required keys of each law, and optional ones.
 NEEDS = {"uniform": ("low", "high"), "log_uniform": ("low", "high"), "normal": ("mean", "sd"), "choices": ("values",)}
@@ -133,8 +133,7 @@ class Law(Strict):
             yield f"sd = {sd:g}: is over a million times as wide as low to high; write law = 'uniform'"
 
 
-@dataclass(frozen=True)
-class Sampled:
+class Sampled(Record):
     """Distribution of an input of a posterior sample: its sorted ``values``."""
 
     values: tuple[Any, ...]

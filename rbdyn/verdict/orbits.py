@@ -8,7 +8,7 @@ bearings alike, and the class that they name.
 import math
 from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import astuple, dataclass, fields
+from dataclasses import astuple, fields
 from typing import Literal, NamedTuple, get_args
 
 import numpy as np
@@ -27,8 +27,7 @@ PRIOR_OF_CLASS, PRIOR_OF_OTHERS = 0.5, 1.0
 CageClass = Literal["held", "circling", "fast whirl", "rattling", "wandering", "not judged"]
 
 
-@dataclass(frozen=True)
-class Thresholds:
+class Thresholds(Record):
     """Limits between the classes; radii over the radial play, rates over the speed of the cage."""
 
     still_radius: float = 0.2
@@ -48,8 +47,7 @@ class Thresholds:
         return max(math.ceil((prior * self.least_share - PRIOR_OF_CLASS) / (1.0 - self.least_share) - 1e-9), 1)
 
 
-@dataclass(frozen=True)
-class Orbit:
+class Orbit(Record):
     """Measures of an orbit: offset and rms radius over the play, share of the spectrum by its main line, rate over the cage's."""
 
     offset: float
@@ -108,8 +106,7 @@ def mean_measures(orbit: Complex, play: float, samples_per_turn: float = SAMPLES
     return Orbit(offset, math.sqrt(sum(block.radius**2 for block in blocks) / len(blocks)), concentration, rate)
 
 
-@dataclass(frozen=True)
-class Forcing:
+class Forcing(Record):
     """What else decides on the class of an orbit.
 
     ``orders``: of forces, over the speed of the cage, 1 for its imbalance; ``film_rate``: fastest rate, over that speed, at which a

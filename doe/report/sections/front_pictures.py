@@ -7,7 +7,7 @@ run was spent and why. ``front.js`` adds the marked point, which it finds by the
 import json
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import partial
 from itertools import combinations
 from textwrap import fill
@@ -19,6 +19,7 @@ from doe.workflow.confirmation import ConfirmedPoint, point_words
 from doe.workflow.front_record import Point as FrontPoint
 from doe.workflow.front_record import SearchResult
 from doe.workflow.problem import Factor
+from rbdyn.base.records import Record
 from rbdyn.base.words import label, quantity, shown, with_error
 
 if TYPE_CHECKING:
@@ -71,8 +72,7 @@ AXIS_WIDTH = 96.0
 LIMIT: dict[str, Any] = {"color": COLOURS["vermilion"], "linewidth": 1.6, "dashes": (4.4, 1.9)}
 
 
-@dataclass(frozen=True)
-class Front:
+class Front(Record):
     """A set of points to look through; ``role`` tells them apart in pictures."""
 
     role: str
@@ -80,8 +80,7 @@ class Front:
     points: Sequence[FrontPoint]
 
 
-@dataclass(frozen=True)
-class Coordinate:
+class Coordinate(Record):
     """A factor or a response along which points are drawn: the ``kind`` of value, its name and its place among its kind."""
 
     kind: str
@@ -116,8 +115,7 @@ def near(bounds: Iterable[float], values: Iterable[float]) -> list[float]:
     return [bound for bound in bounds if 2.0 * low - high <= bound <= 2.0 * high - low]
 
 
-@dataclass(frozen=True)
-class Fronts:
+class Fronts(Record):
     """Fronts that are drawn together, with ``marks`` by name, what simulation ``confirmed`` of them, and limits by response."""
 
     sets: Sequence[Front]

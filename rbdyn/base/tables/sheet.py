@@ -11,7 +11,6 @@ from codecs import BOM_UTF8, BOM_UTF16_BE, BOM_UTF16_LE
 from collections import Counter
 from collections.abc import Collection, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
 from functools import cached_property
 from itertools import islice
 from pathlib import Path
@@ -22,7 +21,7 @@ import numpy as np
 from rbdyn.base.arrays import Array
 from rbdyn.base.faults import LONGEST_NAME, MOST_FAULTS, InputError, not_utf_8, one_line, read_bytes, refuse
 from rbdyn.base.notes import Note, Notes
-from rbdyn.base.records import NUMBER, plain_cell, quoted_cell
+from rbdyn.base.records import NUMBER, Record, plain_cell, quoted_cell
 from rbdyn.base.tables.decimal_marks import POINT, Exact, Marks, is_like_number, marks_of
 from rbdyn.base.tables.workbook import ARCHIVE, OLD, SUFFIXES, letters, read_workbook, split_path
 from rbdyn.base.words import counted
@@ -76,8 +75,7 @@ class Limits(NamedTuple):
         return np.flatnonzero(~valid).tolist()
 
 
-@dataclass(frozen=True)
-class InputColumn:
+class InputColumn(Record):
     """A column of a table: its ``name``, the stripped ``texts`` of its cells, and the ``marks`` of the table's numbers.
 
     ``cells``: names of the cells in a workbook.
@@ -129,8 +127,7 @@ class InputColumn:
         return values, faults
 
 
-@dataclass(frozen=True)
-class InputTable:
+class InputTable(Record):
     """A table as it is read: names of its columns, rows of fields as they are written, marks of its numbers, and how it was read
     (no words: the usual way).
 

@@ -7,12 +7,12 @@ both groups.
 """
 
 import math
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
 from rbdyn.base.arrays import Array
+from rbdyn.base.records import Record
 from rbdyn.contact.hertz_line import palmgren
 from rbdyn.contact.traction import traction
 from rbdyn.dynamics.forces.bodies import action
@@ -43,8 +43,7 @@ START_SLIP, START_PLAY = 0.02, 0.8
 START_GAP = 2e-6
 
 
-@dataclass(frozen=True)
-class Scales:
+class Scales(Record):
     """Characteristic load [N], approach [m] and speed [m/s] of a race contact: the scales of errors."""
 
     load: float

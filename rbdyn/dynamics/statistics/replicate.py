@@ -1,17 +1,17 @@
 """One run in batches, and figures as functions of sums over its batches."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import NamedTuple
 
 import numpy as np
 
 from rbdyn.base.arrays import Array, Complex
+from rbdyn.base.records import Record
 from rbdyn.losses import INNER_ROLLING, LOAD, POWER_TERMS, SHAFT
 
 
-@dataclass(frozen=True)
-class Replicate:
+class Replicate(Record):
     """One run in batches. Times in s, works and energies in J, loads in N, angles in rad.
 
     Arrays over batches, from the start on; figures count from the batch ``first``, and ``per_window`` batches make an

@@ -15,7 +15,6 @@ the size of the limits, and a fresh lot confirms the design, linearly and in ful
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -23,6 +22,7 @@ from numpy.typing import NDArray
 
 from rbdyn.base.arrays import Array, Whole
 from rbdyn.base.faults import InputError, MethodError, RunError
+from rbdyn.base.records import Record
 from rbdyn.quasistatic.row.ball import Control
 from rbdyn.quasistatic.row.equilibrium import Solution, solve
 from rbdyn.quasistatic.row.model import constraint_of, load_of, row_of
@@ -83,8 +83,7 @@ def _equilibrium(solution: Solution) -> Solution:
     return solution
 
 
-@dataclass(frozen=True)
-class Lot:
+class Lot(Record):
     """Distribution of the parts of a lot. Lengths in m.
 
     ``lowest_order, highest_order, decay``: of each race error; amplitudes are Rayleigh distributed, with a mean that falls as
@@ -225,8 +224,7 @@ REFINEMENTS = 3
 SWAY_SHARES = tuple(2.0 ** (0.5 * k) for k in range(-6, 7))
 
 
-@dataclass(frozen=True)
-class FullCheck:
+class FullCheck(Record):
     """Check of the linear response by full equilibria of the first bearings of a lot.
 
     ``radial_rms, face_rms``: differences of linear and full runouts over their limits. ``agreeing``: number of the
@@ -242,8 +240,7 @@ class FullCheck:
     gap_error: float
 
 
-@dataclass(frozen=True)
-class RaceLimits:
+class RaceLimits(Record):
     """Limits [m] on the heights of race errors, and their yield.
 
     ``radial_limit, axial_limit``: limits K_ia and S_ia of the class [m]. ``yielded``: share of a fresh lot that meets both,
@@ -267,8 +264,7 @@ class RaceLimits:
     check: FullCheck | None
 
 
-@dataclass(frozen=True)
-class Bench:
+class Bench(Record):
     """Measurement of runout: a nominal row under an axial load, as in ``equilibrium.solve``.
 
     ``face_radius``: radius at which the axial indicator touches the inner ring [m]. ``steps`` a turn, ``turns`` of the ring.

@@ -25,7 +25,6 @@ The runout of a path has limits by tolerance class (ISO 492). Three independent 
 """
 
 import math
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal, NamedTuple, get_args
 
 import numpy as np
@@ -34,6 +33,7 @@ from scipy.optimize import linprog
 from rbdyn.base.arrays import Array, Whole
 from rbdyn.base.blocks import Column, Sheet, frame_of
 from rbdyn.base.faults import MethodError, RunError
+from rbdyn.base.records import Record
 from rbdyn.base.words import counted
 from rbdyn.properties import table
 from rbdyn.quasistatic.row.ball import Control
@@ -47,8 +47,7 @@ if TYPE_CHECKING:
 ToleranceClass = Literal["P2", "P4", "P5", "P6", "normal"]
 
 
-@dataclass(frozen=True)
-class RunningAccuracy:
+class RunningAccuracy(Record):
     """Largest permitted runouts [m]; None where the class sets no limit or no source is known.
 
     ``radial``: K_ia, of the assembled bearing's inner ring; ``face``: S_d, of its side face with the bore; ``axial``:
@@ -100,8 +99,7 @@ PLACES = 72
 STEPS = 60
 
 
-@dataclass(frozen=True)
-class Runout:
+class Runout(Record):
     """Runout [m] of a path of whole turns.
 
     ``axial``: range of the axial displacement. ``face``: range of an axial indicator at the worst position on the ring's
@@ -314,8 +312,7 @@ def _best_step(points: Array, zone: Zone, normal: Array, offset: Array, trust: f
     return scale * optimum.x[:2], float(scale * optimum.fun)
 
 
-@dataclass(frozen=True)
-class Waviness:
+class Waviness(Record):
     """Sum of amplitude cos(order (angle - phase)) over harmonics: orders [-], amplitudes [m], phases [rad]."""
 
     order: Whole
@@ -369,8 +366,7 @@ def random_waviness(lowest: int, highest: int, height: float, decay: float, draw
     return form.scaled(height / form.height)
 
 
-@dataclass(frozen=True)
-class RaceErrors:
+class RaceErrors(Record):
     """Form errors of one row of Z balls.
 
     ``ball_diameter`` (Z,): diameter of each ball less the nominal one [m]. ``sphericity``: waviness round each ball, by the
@@ -473,8 +469,7 @@ def ball_path(errors: RaceErrors, turning: Turning, steps: int, turns: int = 1, 
     )
 
 
-@dataclass(frozen=True)
-class RingPath:
+class RingPath(Record):
     """Path of the inner ring. ``path`` (steps, 5): displacements x, y, z [m], theta_x, theta_y [rad].
 
     ``ring_angle`` (steps,) [rad]. ``largest_load`` (steps,): of any ball on any race [N]. ``residual``: largest unbalanced
