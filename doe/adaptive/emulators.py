@@ -13,7 +13,7 @@ improvement (2021).
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -23,6 +23,7 @@ from scipy.stats import qmc
 from doe.emulator import Emulator, NoisyValues, fit_emulator
 from doe.pareto.search import REFERENCE, Goals, non_dominated
 from rbdyn.base.arrays import Array, Mask, Rows, Whole
+from rbdyn.base.records import Record
 
 # Prior of the logarithm of a length scale in half ranges. The bearing's whirl turns several times between two levels of a
 # design: the emulators' own prior, of longer lengths, lost 1.5 % of its front in 5 of 5 searches.
@@ -64,8 +65,7 @@ class Runs(NamedTuple):
 Evaluate = Callable[[Array, Whole], tuple[Array, Array, Whole]]
 
 
-@dataclass(frozen=True, eq=False)
-class Emulators:
+class Emulators(Record, eq=False):
     """Emulators ``by_response`` (m) from the runs that went well.
 
     ``shares`` (m) are of the factors whose logarithms an emulator takes. Deviations are multiplied by ``stretch`` (m,), at
@@ -311,8 +311,7 @@ def proper_rows(costs: Array) -> Rows:
         rows = proper
 
 
-@dataclass(frozen=True, eq=False)
-class Levels:
+class Levels(Record, eq=False):
     """Levels ``costs`` (u, q) spread evenly over the box of costs from ``low`` to ``high`` (q,).
 
     ``ideal`` and ``nadir`` (q,) of the predicted front are the scale of the hypervolume.
@@ -358,8 +357,7 @@ def dominated(costs: Array, feasible: Mask, levels: Array) -> Mask:
     return mask
 
 
-@dataclass(frozen=True, eq=False)
-class Dominance:
+class Dominance(Record, eq=False):
     """Which levels runs dominate on each drawn front, ``dominated`` (s, u)."""
 
     levels: Levels

@@ -110,8 +110,7 @@ class Batch(Record, kw_only=True):
 Watch = Callable[[Batch, int, int], None]
 
 
-@dataclass(frozen=True, eq=False)
-class AdaptiveFront:
+class AdaptiveFront(Record, eq=False):
     """A front found by emulators and confirmed by fresh runs.
 
     - ``front``: its finalists in factor units with their fresh runs alone, and all runs of the search

@@ -11,7 +11,7 @@ of the cube -1 and +1, one column a factor. ``to_actual`` and ``to_coded`` conve
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import product
 from typing import Literal, Self
 
@@ -20,14 +20,14 @@ from numpy.typing import ArrayLike
 
 from rbdyn.base.arrays import Array, Rows, Whole
 from rbdyn.base.faults import MethodError
+from rbdyn.base.records import Record
 from rbdyn.base.words import counted
 
 Region = Literal["ball", "box"]
 SAME_POINT = 1e-9  # coded units within which two runs are replicates
 
 
-@dataclass(frozen=True, eq=False)
-class Design:
+class Design(Record, eq=False):
     """Runs of a design in the order of execution.
 
     ``coded`` (n, k): points in coded units. ``block`` (n,): number of the block of each run, from 0. ``kind`` (n,): kind of

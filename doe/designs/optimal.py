@@ -8,7 +8,6 @@ Technometrics 37 (1995) 60-69; exchange formulas of Fedorov, Theory of Optimal E
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -18,6 +17,7 @@ from doe.designs.design import Design, design_of_parts
 from doe.designs.model import Terms, model_matrix, model_terms, moment_matrix
 from rbdyn.base.arrays import Array
 from rbdyn.base.faults import MethodError
+from rbdyn.base.records import Record
 from rbdyn.base.words import counted
 
 Criterion = Literal["d", "i"]
@@ -80,8 +80,7 @@ def _on_parts(number: ArrayLike) -> Array:
     return np.asarray(np.rint(np.asarray(number, float)).clip(-GRID_STEPS, GRID_STEPS) / GRID_STEPS)
 
 
-@dataclass(frozen=True, eq=False)
-class Exchange:
+class Exchange(Record, eq=False):
     """Coordinate exchange in many designs (s, n, k) of new runs in parallel, in the box from -1 to 1.
 
     ``fixed_information`` (p, p): X'X of the runs at the centre. ``moments`` (p, p): weights of the variances of an I-optimal
@@ -178,8 +177,7 @@ class Exchange:
         return np.where(estimable, less / (variance * np.where(estimable, ratio, 1.0)), -1.0)
 
 
-@dataclass(frozen=True, eq=False)
-class Remaining:
+class Remaining(Record, eq=False):
     """The region about coded points (n, k) of runs that went well (``ran``), apart from those that ``failed`` (f, k)."""
 
     ran: Array

@@ -13,7 +13,6 @@ and Recht, Random features for large-scale kernel machines (2007), for draws.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
@@ -25,6 +24,7 @@ from scipy.linalg import lapack
 from doe.designs.model import model_matrix, model_terms, term_powers
 from rbdyn.base.arrays import Array, Whole, one_thread
 from rbdyn.base.faults import MethodError
+from rbdyn.base.records import Record
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -53,8 +53,7 @@ class Hyperparameters(NamedTuple):
     level: float
 
 
-@dataclass(frozen=True, eq=False)
-class Emulator:
+class Emulator(Record, eq=False):
     """A fitted emulator of one response.
 
     ``points`` (n, k), ``values`` (n,) and known ``variances`` (n,) of the runs; the trend has the ``degree`` 0 to 2;
@@ -175,8 +174,7 @@ def random_features(lengths: Array, count: int, random: np.random.Generator) -> 
     )
 
 
-@dataclass(frozen=True, eq=False)
-class Draws:
+class Draws(Record, eq=False):
     """Random functions of an emulator's posterior: those of the prior, moved by what it takes to pass the runs."""
 
     emulator: Emulator

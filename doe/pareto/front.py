@@ -11,7 +11,6 @@ Source: Box and Tiao, Bayesian Inference in Statistical Analysis, section 2.7.
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -57,8 +56,7 @@ class Dominance(Record):
     draws: int
 
 
-@dataclass(frozen=True, eq=False)
-class FrontUncertainty:
+class FrontUncertainty(Record, eq=False):
     """Uncertainty of a front.
 
     ``non_dominated`` (f,): probability that no other front point dominates a point. ``pick_dominates`` the
@@ -145,8 +143,7 @@ def contrast_error(jacobian: Array, covariance: Array) -> float:
     return math.sqrt(max(float(jacobian @ covariance @ jacobian), 0.0))
 
 
-@dataclass(frozen=True, eq=False)
-class ParetoFront:
+class ParetoFront(Record, eq=False):
     """Non-dominated points of all evaluated points, in ascending order of the first cost.
 
     ``points`` (f, k) in the factors' units; ``values`` (f, m) of all responses in their units, ``costs`` (f, q) by their goals.
@@ -308,8 +305,7 @@ class Samples(NamedTuple):
         return Samples(*(part[which] for part in self))
 
 
-@dataclass(frozen=True, eq=False)
-class SimulatedFront:
+class SimulatedFront(Record, eq=False):
     """Front of a noisy simulator, in ascending order of the first cost at selection.
 
     ``points`` (f, k); ``values`` and ``standard_errors`` (f, m) of their fresh runs, with their ``costs`` and

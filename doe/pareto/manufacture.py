@@ -18,7 +18,6 @@ or a quantile in place of the mean; Brown, Cai and DasGupta, Interval estimation
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from functools import lru_cache, partial
 from itertools import product
 from typing import Literal, NamedTuple
@@ -56,8 +55,7 @@ def identity(values: Array) -> Array:
     return values
 
 
-@dataclass(frozen=True, eq=False)
-class Quadratic:
+class Quadratic(Record, eq=False):
     """``link`` of constant + linear · x + x · matrix · x at coded points x; ``matrix`` (k, k) is symmetric."""
 
     constant: float
@@ -231,8 +229,7 @@ Kind = Literal["worst_case", "quantile"]
 SURVIVAL_PARTS = 4096  # even offsets that give the share of surviving parts
 
 
-@dataclass(frozen=True, eq=False)
-class ToleranceBox:
+class ToleranceBox(Record, eq=False):
     """Half widths (k,) of the tolerances in coded units, and the robust cost of the parts within them.
 
     "worst_case": the exact worst in the box. "quantile": the ``quantile`` of each response alone, over ``samples`` even
@@ -286,8 +283,7 @@ class Survival(Record):
     open_errors: str
 
 
-@dataclass(frozen=True, eq=False)
-class ToleranceAware:
+class ToleranceAware(Record, eq=False):
     """Front of robust costs.
 
     ``points`` (f, k) are coded, ``costs`` (f, q) robust, ``values`` (f, m) nominal responses, ``picks`` rows.

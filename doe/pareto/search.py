@@ -16,7 +16,6 @@ of several response variables (1980); Steuer and Choo, An interactive weighted T
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from itertools import accumulate
 from typing import Any, Literal, NamedTuple, Self, get_args
 
@@ -26,6 +25,7 @@ from scipy.stats import qmc
 from doe.pareto.evolution import evolve
 from rbdyn.base.arrays import Array, Mask, Rows
 from rbdyn.base.faults import MethodError
+from rbdyn.base.records import Record
 
 REFERENCE = 1.1  # reference point of the hypervolume: the nadir and a tenth of each range beyond it
 LEVELS = 13  # 2^13 levels of the costs by which sets of points are compared
@@ -265,8 +265,7 @@ Kind = Literal["min", "max", "target", "none"]
 BLANK = {"target": np.nan, "lower": -np.inf, "upper": np.inf, "weight": 1.0}
 
 
-@dataclass(frozen=True, eq=False)
-class Goals:
+class Goals(Record, eq=False):
     """Goals of m responses.
 
     ``kinds`` (m,); ``target`` (m,), NaN without one; ``lower`` and ``upper`` limits (m,), infinite without one; ``weight`` (m,).

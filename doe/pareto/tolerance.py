@@ -8,7 +8,7 @@ tolerance, where the same shape applies.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from itertools import product
 from typing import Self
@@ -30,6 +30,7 @@ from doe.pareto.manufacture import (
 from doe.pareto.search import NAMES, Goals, Rule, dominates, non_dominated, pick_all
 from rbdyn.base.arrays import Array, Mask, Rows
 from rbdyn.base.faults import MethodError
+from rbdyn.base.records import Record
 
 Costs = Callable[[Array], Array]
 # Number (d,) of the parts (n, k) that keep all limits, on each draw of the surfaces or emulators.
@@ -41,8 +42,7 @@ RIM = "the bound of the region"
 MOST_JUDGED = 4096  # parts that are evaluated on every draw
 
 
-@dataclass(frozen=True, eq=False)
-class WidestTolerances:
+class WidestTolerances(Record, eq=False):
     """Half widths (k,) of the widest tolerances, NaN for factors without one.
 
     ``probability``: share of the parts that keep every limit, with its Monte Carlo ``standard_error``. ``interval``: 95 %
@@ -65,8 +65,7 @@ class WidestTolerances:
         return replace(self, half_widths=half, at_rim=rim)
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Parts:
+class Parts(Record, eq=False, kw_only=True):
     """Parts about a nominal point ``centre`` (k,), which keep all limits with a stated ``probability``.
 
     objectives : maps points (samples, k) to costs (samples, c).
@@ -202,8 +201,7 @@ NEIGHBOURS = 10  # runs a coefficient of the local linear fit, of which tricube 
 HARDLY_VARIED = 0.1  # share of the neighbours' largest spread below which a direction has no slope
 
 
-@dataclass(frozen=True, eq=False)
-class Neighbourhood:
+class Neighbourhood(Record, eq=False):
     """Surfaces and their local correction by ``slopes`` (n, k, m) about coded points (n, k)."""
 
     surfaces: Sequence[Quadratic]
@@ -227,8 +225,7 @@ class Neighbourhood:
         return self.values[:, None, :] + np.stack(shape, axis=-1) + np.einsum("sk,nkm->nsm", offsets, self.slopes)
 
 
-@dataclass(frozen=True, eq=False)
-class SimulatedAware:
+class SimulatedAware(Record, eq=False):
     """Robust costs (n, q) of the points of a simulated front, and their violations of each limit (n, c).
 
     ``robust_baseline`` (q,): robust costs of the baseline. ``survives`` (n,): share of the parts at a point that dominate the

@@ -13,7 +13,6 @@ and Cox, An analysis of transformations, J. R. Stat. Soc. B 26 (1964) 211-252.
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from operator import itemgetter
 
 import numpy as np
@@ -32,8 +31,7 @@ SPLIT = 2.0**27 + 1.0  # divides the digits of a double into halves
 ROUNDING = 8 * np.finfo(np.float64).eps  # share of the response below which a value is rounding
 
 
-@dataclass(frozen=True, eq=False)
-class LeastSquares:
+class LeastSquares(Record, eq=False):
     """Minimum of the sum of squared residuals.
 
     ``coefficients`` (p,); ``inverse`` (p, p) of X'X; ``residuals`` (n,) in the unit of the response;
@@ -135,8 +133,7 @@ def _powers_of_two(columns: Array) -> Array:
     return np.asarray(np.ldexp(1.0, np.frexp(largest)[1]))
 
 
-@dataclass(frozen=True, eq=False)
-class Data:
+class Data(Record, eq=False):
     """Runs of one response.
 
     ``points`` (n, k) are coded; ``values`` (n,). ``standard_errors`` (n,): None unless all are known. ``replicates`` (n,):

@@ -20,7 +20,7 @@ import time
 import uuid
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import Any, NamedTuple, Self, TypeVar
 
@@ -37,8 +37,7 @@ T = TypeVar("T")
 _NUMBER = re.compile(r"[-+]?\d+(\.\d+)?(e[-+]?\d+)?")
 
 
-@dataclass(frozen=True)
-class Failure:
+class Failure(records.Record):
     """A failed point: its label, the cause, its number in the design (None outside of it) and its factors."""
 
     label: str
@@ -229,8 +228,7 @@ def _patiently(connection: sqlite3.Connection, statement: str) -> list[Any]:
             time.sleep(0.05)
 
 
-@dataclass(frozen=True)
-class Point:
+class Point(records.Record):
     """A run to do: its key, label, number in the design and factors."""
 
     key: str
@@ -239,8 +237,7 @@ class Point:
     factors: Mapping[str, float] = field(default_factory=dict)
 
 
-@dataclass(frozen=True)
-class CurrentRun:
+class CurrentRun(records.Record):
     """A run under way: its key, label and number, where it runs, and since when [s since the epoch]."""
 
     key: str
@@ -251,8 +248,7 @@ class CurrentRun:
     since: float
 
 
-@dataclass(frozen=True)
-class EndedRun:
+class EndedRun(records.Record):
     """An ended run: its status, "done" or "failed", and its duration [s], None for a result without one."""
 
     key: str

@@ -6,7 +6,7 @@ A study can also be made from a table alone, of which some columns are factors a
 import re
 from collections import Counter
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
@@ -46,6 +46,7 @@ from rbdyn.base.faults import (
     validated,
 )
 from rbdyn.base.notes import Note, Notes
+from rbdyn.base.records import Record
 from rbdyn.base.tables.decimal_marks import is_like_number
 from rbdyn.base.tables.sheet import DATE, InputColumn, InputTable, listed, quoted, read_sheet
 from rbdyn.base.tables.workbook import split_path
@@ -245,8 +246,7 @@ def _claims(keys: Sequence[str]) -> dict[tuple[str, ...], str]:
     return factors | {("numerics", "seed"): SEEDS, ("uncertain",): DECLARATIONS, ("calibrate",): DECLARATIONS}
 
 
-@dataclass(frozen=True)
-class Study:
+class Study(Record):
     """A checked study and the path of its file; paths in it are relative to its folder."""
 
     path: Path

@@ -16,7 +16,7 @@ factors, J. Am. Statist. Assoc. 90 (1995) 773.
 """
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from typing import NamedTuple
 
@@ -113,16 +113,14 @@ class Batch(NamedTuple):
         return Batch(*(np.concatenate(pair) for pair in zip(self, other, strict=True)))
 
 
-@dataclass(frozen=True, eq=False)
-class Unknowns:
+class Unknowns(Record, eq=False):
     """Number of unknown inputs; ``quantiles`` turns normal scores (n, d) into their quantiles by the inputs' dependence."""
 
     inputs: int
     quantiles: Callable[[Array], Array] = special.ndtr
 
 
-@dataclass(frozen=True, eq=False)
-class Matched:
+class Matched(Record, eq=False):
     """The result of a calibration.
 
     volumes : share of the prior that is plausible after each wave
@@ -300,8 +298,7 @@ class Explanation(NamedTuple):
         return self.evidence is None or self.evidence < STRONG
 
 
-@dataclass(frozen=True, eq=False)
-class Particles:
+class Particles(Record, eq=False):
     """Some particles of every power, in no order, and the measured cells there."""
 
     levels: list[Level]
@@ -420,8 +417,7 @@ def joint_factor(beyond: Mask) -> float:
     return bayes_factor(float(beyond.any(axis=1).mean()), 1.0 - (1.0 - 2.0 * BEYOND) ** beyond.shape[1])
 
 
-@dataclass(frozen=True, eq=False)
-class Judgement:
+class Judgement(Record, eq=False):
     """What may be claimed of a calibration.
 
     trial, outputs : how well cells were predicted, and whether each output is explained

@@ -31,7 +31,6 @@ Wu, Annals of Statistics 17 (1989) 1176 (the delete-d jackknife).
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations
 from typing import Literal, NamedTuple
@@ -221,8 +220,7 @@ class DecisiveInputs(Record):
     needed: float
 
 
-@dataclass(frozen=True, eq=False)
-class _Gain:
+class _Gain(Record, eq=False):
     """A gain (n,) with its variances, its emulator and that emulator's covariances (k, n) with fresh input sets."""
 
     emulator: Emulator
@@ -267,8 +265,7 @@ class _Gain:
         return max(1.0 - float((missed**2).mean()) / max(variance, 1e-300), 0.0)
 
 
-@dataclass(frozen=True, eq=False)
-class _Slices:
+class _Slices(Record, eq=False):
     """Slices of the ranges of inputs that could be measured; the last input does nothing.
 
     averaging : averages over the sets of each slice: a row a slice, 1/count at its sets
@@ -419,8 +416,7 @@ class _Figures(NamedTuple):
         return np.array([self.values - np.hypot(low, below), self.values + np.hypot(high, above)])
 
 
-@dataclass(frozen=True, eq=False)
-class _Measured:
+class _Measured(Record, eq=False):
     """Worths and flips (i,) of inputs at ``places``, on which side the new design is better, and worths of pairs (p,)."""
 
     places: Sequence[int]

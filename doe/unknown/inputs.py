@@ -9,7 +9,6 @@ for Digital Computers (1960) (forward selection).
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -19,6 +18,7 @@ from scipy.spatial import KDTree
 from scipy.stats import qmc
 
 from rbdyn.base.arrays import Array
+from rbdyn.base.records import Record
 from rbdyn.scene.uncertain import Law, Sampled
 
 # Quantiles are kept this far from 0 and 1.
@@ -86,8 +86,7 @@ def nested(inputs: int, points: int, seed: int) -> Array:
     return qmc.Sobol(inputs, rng=np.random.default_rng(seed)).random_base2(int(points).bit_length() - 1)
 
 
-@dataclass(frozen=True, eq=False)
-class Joint:
+class Joint(Record, eq=False):
     """Dependence of the inputs, of which there are ``inputs``.
 
     rows, columns : (r, s), quantiles of a sample, and the places (s,) of its inputs

@@ -42,7 +42,7 @@ a discrepancy).
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -57,8 +57,7 @@ from rbdyn.base.records import Record, outside_json
 LEFT_OUT, MOST = 0.05, 12
 
 
-@dataclass(frozen=True, eq=False)
-class Cells:
+class Cells(Record, eq=False):
     """Emulators of components: ``middle`` (c,) and ``axes`` (p, c) of the cells, and the variance (c,) of what is left out."""
 
     middle: Array
@@ -128,8 +127,7 @@ class Errors(NamedTuple):
     beyond: Mask
 
 
-@dataclass(frozen=True, eq=False)
-class Measured:
+class Measured(Record, eq=False):
     """Measured cells, in logarithms.
 
     values, variances : (c,), measured, and variances of rig and integration

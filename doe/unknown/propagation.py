@@ -26,7 +26,7 @@ Staum, SIAM/ASA J. Uncertainty Quantification 4 (2016) 1060; Broto, Bachoc and D
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -58,8 +58,7 @@ class Share(NamedTuple):
         return f"{value:.0f} ({low:.0f} to {high:.0f})"
 
 
-@dataclass(frozen=True, eq=False)
-class Runs:
+class Runs(Record, eq=False):
     """Runs at quantiles (n, d) of their inputs.
 
     values, variances, freedom : (n,), outputs, their variances by replicates, and the degrees of freedom of these
@@ -73,8 +72,7 @@ class Runs:
     numerical: float = 0.0
 
 
-@dataclass(frozen=True, eq=False)
-class Emulated:
+class Emulated(Record, eq=False):
     """Emulator of an output over the quantiles of its inputs at ``columns``.
 
     logarithmic : whether it emulates logarithms, as it does if all outputs are positive

@@ -5,7 +5,7 @@ Its front is compared with that on the surfaces on one scale. Factor by factor, 
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import ClassVar, NamedTuple
 
 import numpy as np
@@ -38,8 +38,7 @@ ALIKE = 0.01
 ABOUT, HALF_LEVEL = 6, 0.5
 
 
-@dataclass(frozen=True, eq=False)
-class Adaptive:
+class Adaptive(Record, eq=False):
     """The front of an adaptive search, its failed runs and its wall time [s].
 
     ``edges`` (k, 2): ends of the finally searched region in factor units. ``front``: the finalists of ``search``.

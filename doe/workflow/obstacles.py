@@ -13,7 +13,6 @@ at the ends of its tolerances where the study asks for that.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
@@ -363,8 +362,7 @@ class Prediction(NamedTuple):
     keeps: bool
 
 
-@dataclass(frozen=True, eq=False)
-class Forecast:
+class Forecast(Record, eq=False):
     """Predictions by which the pick of a study was chosen, and the ``source`` of these in words.
 
     ``searched`` and ``searched_pick`` are None where the pick is one of the front on the surfaces.

@@ -6,7 +6,7 @@ baseline in every response with a goal, whichever gains the widest tolerances ke
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -47,8 +47,7 @@ from rbdyn.base.words import improvement, quantity, shown
 LARGE_FREEDOM = 1e9
 
 
-@dataclass(frozen=True, eq=False)
-class SearchedPick:
+class SearchedPick(Record, eq=False):
     """A row of the searched front and why it was picked; ``aware`` is None where the study asks for no tolerances.
 
     ``shares`` (f,): share of draws of the errors of the front's runs in which each row is the pick. The changes within the
@@ -174,8 +173,7 @@ def _levels(confirmed: Confirmed, count: int, random: np.random.Generator) -> Ar
 LOST = 3
 
 
-@dataclass(frozen=True, eq=False)
-class Selection:
+class Selection(Record, eq=False):
     """The front with the pick, the pick of the searched front (None without a search), simulated points, and failures.
 
     ``confirmed`` by name: "baseline", "pick", other picks, then "try_1" and so on for picks that did not keep their

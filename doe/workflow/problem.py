@@ -4,7 +4,7 @@ import difflib
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import cached_property, partial
 from itertools import compress
 from string import ascii_uppercase
@@ -44,7 +44,6 @@ class RunPlan(Record):
     factors: list[dict[str, float]]
 
 
-@dataclass(frozen=True)
 class Problem(Study):
     """A study with all that follows from it alone, computed when it is first asked for.
 

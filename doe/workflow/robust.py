@@ -7,7 +7,7 @@ until the further runs that the study allows are spent. The robust front holds p
 import math
 from collections.abc import Mapping, Sequence
 from copy import deepcopy
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property, reduce
 from typing import Any
 
@@ -235,8 +235,7 @@ def _emulators(
     return _GainEmulators(gain, limit_emulators, goals, box, case.joint(case.every).sets(SEARCHED, seed), residuals)
 
 
-@dataclass(frozen=True, eq=False)
-class _GainEmulators:
+class _GainEmulators(Record, eq=False):
     """Emulators of gains over the baseline and of limited responses, at ``sets`` (s, d + 1) of inputs.
 
     ``offset`` (s, q): a residual of a run for each set, which is added to the gains. ``box``: ends (k,) of the region.

@@ -10,7 +10,7 @@ import difflib
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from copy import deepcopy
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -191,8 +191,7 @@ class RowFigures(Record):
         return dict(zip(self.names, map(finite, self.numbers[kind].tolist()), strict=True))
 
 
-@dataclass(frozen=True)
-class RowRun:
+class RowRun(Record):
     """A row with the figures of its run, or with the ``cause`` of its failure."""
 
     row: SceneRow

@@ -6,7 +6,7 @@ Gains are predicted with errors, and a published table of the same design is com
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from string import ascii_uppercase
@@ -289,8 +289,7 @@ LEFT_OUT = 1e-8  # variance that the root of a field of variance 1 may leave out
 MOST_COLUMNS = 300  # of the root of a field
 
 
-@dataclass(frozen=True, eq=False)
-class Simulated:
+class Simulated(Record, eq=False):
     """Simulated responses (c, m) at coded points (c, k), with their standard errors (c, m)."""
 
     points: Array
@@ -374,8 +373,7 @@ def field_root(coded: Array) -> Array:
     return columns
 
 
-@dataclass(frozen=True, eq=False)
-class _Posterior:
+class _Posterior(Record, eq=False):
     """A response at n points on the scale of its fit: its ``mean`` (n,) and the ``matrix`` (n, p) of the model.
 
     ``roots`` of the covariances of its coefficients (p, runs) and of its field (n, r), with the degrees of ``freedom`` of

@@ -9,7 +9,7 @@ tolerances without that gain.
 """
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import cached_property
 
 import numpy as np
@@ -93,8 +93,7 @@ class FactorTolerance(Record):
         return ": ".join(filter(None, (self.grade or "", ", ".join(parts))))
 
 
-@dataclass(frozen=True, eq=False)
-class PickTolerances:
+class PickTolerances(Record, eq=False):
     """The widest tolerances of a pick, with the ``demands`` on its gains and the ``grades`` of the parts by factor.
 
     ``relaxed``: the tolerances without the limiting gain, None where no grade is too fine or no gain limits.
@@ -273,8 +272,7 @@ def _impossible(demands: Sequence[KeptGain]) -> str:
     return ""
 
 
-@dataclass(frozen=True, eq=False)
-class PickParts:
+class PickParts(Record, eq=False):
     """Parts about a pick, a ``point`` (k,) in factor units: their responses, the gains there, and the widest tolerances.
 
     A part keeps its promise if all limits hold and each gain that counts has its least size. ``confirmed``: simulated

@@ -28,8 +28,7 @@ SELECTING = 4  # fresh runs a candidate
 REPORTING = 4  # fresh runs a finalist at least
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
-class DirectFront(SimulatedFront):
+class DirectFront(SimulatedFront, eq=False, kw_only=True):
     """A front with ``repeats`` fresh runs a point, the points of failed runs (x, k), and the effort of its search."""
 
     repeats: int

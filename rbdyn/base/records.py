@@ -71,15 +71,16 @@ def outside_json(**options: Any) -> Any:
 @dataclass_transform(
     frozen_default=True, field_specifiers=(field, keyed, spread, derived, shown, written, nullable, outside_json)
 )
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Record:
-    """Base of all records, which makes them frozen dataclasses; ``kw_only``: with named arguments only.
+    """Base of all records, which makes them frozen dataclasses; ``kw_only``: with named arguments only. Without ``eq`` a record, as of
+    arrays, equals itself alone.
 
     A record whose first base is ``Brief`` keeps the ``repr`` of that.
     """
 
-    def __init_subclass__(cls, kw_only: bool = False) -> None:
-        dataclass(frozen=True, kw_only=kw_only, repr=not issubclass(cls, Brief))(cls)
+    def __init_subclass__(cls, kw_only: bool = False, eq: bool = True) -> None:
+        dataclass(frozen=True, kw_only=kw_only, eq=eq, repr=not issubclass(cls, Brief))(cls)
 
     def __post_init__(self) -> None:
         for item in fields(self):

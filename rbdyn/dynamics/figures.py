@@ -5,7 +5,7 @@ They stand apart from compiled code so that a command can check a name without i
 
 import math
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Literal
 
@@ -13,6 +13,7 @@ import numpy as np
 
 from rbdyn import losses
 from rbdyn.base.arrays import Array
+from rbdyn.base.records import Record
 from rbdyn.base.words import quantity
 from rbdyn.clearances import REPORTED
 from rbdyn.dynamics.forces import state
@@ -25,8 +26,7 @@ if TYPE_CHECKING:
     from rbdyn.scene import Scene
 
 
-@dataclass(frozen=True, eq=False)
-class Figure:
+class Figure(Record, eq=False):
     """A figure by the key of its JSON, which ends with its unit; ``meaning``: in a sentence of the manual and of a rig's table.
 
     - ``statistic``: how it follows from batches; None for what follows from the scene, the largest loads or the heat balance.

@@ -13,7 +13,7 @@ eq 18 lacks that of the middle ring's inner race.
 """
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -23,8 +23,7 @@ from rbdyn.base.records import Record
 from rbdyn.properties.materials import Material
 
 
-@dataclass(frozen=True)
-class Ring:
+class Ring(Record):
     """A ring, a solid (inner radius 0) or hollow shaft, or a housing.
 
     Radii [m]; ``temperature_rise`` above the temperature of the drawing [K], uniform; ``speed`` [rad/s].

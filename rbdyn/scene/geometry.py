@@ -1,12 +1,12 @@
 """Radii, masses and speeds of a mounted roller bearing in SI, computed once for a scene."""
 
 import math
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
 from rbdyn.base.arrays import Array
+from rbdyn.base.records import Record
 from rbdyn.scene import Scene
 
 
@@ -18,8 +18,7 @@ class Kinematics(NamedTuple):
     entrainment: float
 
 
-@dataclass(frozen=True, eq=False)
-class Geometry:
+class Geometry(Record, eq=False):
     """Geometry from a drawing and its mounting.
 
     ``raceways``: radii of outer and inner raceway [m], with the mounted diametral ``clearance`` [m] split evenly about the pitch
