@@ -471,5 +471,4 @@ def _quantity(value: float, figure: "Estimate", numerical: float | None, samples
 
     freedom, error = float(np.squeeze(figure.freedom)), float(np.squeeze(figure.error))
     joint = math.floor(freedom + 1e-9) if math.isfinite(freedom) else None
-    half = error * float(quantile(joint or math.inf))
-    return Quantity(value, finite(half), numerical, samples, joint)
+    return Quantity(value, finite(error * float(quantile(joint or math.inf))), numerical, samples, joint)

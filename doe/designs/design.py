@@ -280,8 +280,7 @@ def box_behnken(factors: int, *, centre_replicates: int = 6, blocks: bool = Fals
             edges.append(point)
             part = place * number // len(TOGETHER[factors])
             of_run.append(int(np.prod(signs) > 0) if len(columns) == 3 else part)
-    centres = np.zeros((centre_replicates, factors))
-    parts = [("edge", np.array(edges)), ("centre", centres)]
+    parts = [("edge", np.array(edges)), ("centre", np.zeros((centre_replicates, factors)))]
     return design_of_parts(parts, [index % number for index in (*of_run, *range(centre_replicates))], 1.0, "ball")
 
 

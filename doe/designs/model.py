@@ -363,5 +363,4 @@ def sample(factors: int, region: Region, reach: float) -> Array:
 
 def lattice(factors: int, reach: float) -> Array:
     """Regular grid of a box with corners, faces and centre: five levels a factor, three for more than six factors."""
-    levels = np.linspace(-reach, reach, 5 if factors <= 6 else 3)
-    return np.array(list(product(levels, repeat=factors)))
+    return np.array(list(product(np.linspace(-reach, reach, 5 if factors <= 6 else 3), repeat=factors)))

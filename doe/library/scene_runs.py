@@ -191,8 +191,7 @@ def run_answer(
                 runs = list(run_rows(scenes, rows, simulations))
             words = "" if share is None else f"part {share[0]} of {share[1]}"
             record = _record(runs, scenes.notes, "" if folder is None else str(folder / "runs.csv"))
-            files = [file for file in (source, base) if file is not None]
-            identity = identity_of("doe run", {}, files)
+            identity = identity_of("doe run", {}, [file for file in (source, base) if file is not None])
             answer = RunsAnswer(record, folder, (), identity=identity, runs=runs, part=words)
 
             def write(stage: Path) -> list[str]:

@@ -424,6 +424,5 @@ def chain(path: Path | str, out: Path | str | None = None, force: bool = False) 
         refused = {name: result.status for name, result in results.items() if result.refused}
         identity = identity_of("doe chain", {}, [path])
         answer = ChainAnswer(record, folder, chains=results, refused=refused, path=path, identity=identity)
-        sheets = part_sheet(results), share_sheet(results)
-        tables = {sheet.file: sheet.records for sheet in sheets}
+        tables = {sheet.file: sheet.records for sheet in (part_sheet(results), share_sheet(results))}
         return replace(answer, files=saved(output, "chain.json", answer, lambda: tables))

@@ -305,8 +305,7 @@ def response_surface(study: Problem, surface: Surface, path: Path) -> None:
         for bound in response.bounds:
             if floor < bound < top + 0.5 * span:
                 corners = [np.array([[side[0, 0], side[0, -1]], [side[-1, 0], side[-1, -1]]]) for side in (x, y)]
-                plane = np.full((2, 2), bound)
-                axis.plot_surface(*corners, plane, color="tab:red", alpha=0.25, linewidth=0)
+                axis.plot_surface(*corners, np.full((2, 2), bound), color="tab:red", alpha=0.25, linewidth=0)
                 top = max(top, bound)
             if values.min() < bound < values.max():
                 axis.contour(x, y, values, zdir="z", offset=floor, colors="tab:red", levels=[bound], linewidths=2.0)

@@ -129,8 +129,7 @@ def _halves(numbers: Array) -> tuple[Array, Array]:
 
 def _powers_of_two(columns: Array) -> Array:
     """Power of two near the largest number of each column; division by it is exact."""
-    largest = np.abs(columns).max(axis=0)
-    return np.asarray(np.ldexp(1.0, np.frexp(largest)[1]))
+    return np.asarray(np.ldexp(1.0, np.frexp(np.abs(columns).max(axis=0))[1]))
 
 
 class Data(Record, eq=False):

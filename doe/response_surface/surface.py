@@ -64,8 +64,7 @@ class Surface(Fit, kw_only=True):
 
         ``fields`` (s, ...): model errors there, on the scale of the fit.
         """
-        columns = model_matrix(coded, self.terms)
-        values = np.moveaxis(columns @ np.asarray(coefficients, float).T, -1, 0)
+        values = np.moveaxis(model_matrix(coded, self.terms) @ np.asarray(coefficients, float).T, -1, 0)
         return self._back(values if fields is None else values + fields)
 
     def prediction_standard_error(self, coded: ArrayLike) -> Array:

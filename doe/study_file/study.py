@@ -304,8 +304,7 @@ class Study(Record):
     def load(cls, path: Path | str) -> Self:
         """Read STUDY.toml. Raises InputError with all faults at once."""
         path = Path(path)
-        data = read_toml(path)
-        return cls(path, validated(StudyFile, data, str(path)))
+        return cls(path, validated(StudyFile, read_toml(path), str(path)))
 
     @property
     def scene(self) -> SceneFile:

@@ -71,8 +71,7 @@ def implausibility(cells: Cells, measured: Measured, quantiles: Array) -> tuple[
 def plausible(implausible: Array, wave: int) -> Mask:
     """Plausible input sets (n,): in the first wave one cell may be off, as emulators are still poor."""
     place = max(implausible.shape[1] - (2 if wave == 0 else 1), 0)
-    worst = np.partition(implausible, place, axis=1)[:, place]
-    return worst < RULED_OUT
+    return np.partition(implausible, place, axis=1)[:, place] < RULED_OUT
 
 
 def ruling_out(implausible: Array) -> Whole:
@@ -393,8 +392,7 @@ def explanations(names: Sequence[str], match: Matched, points: Array, seed: int)
     measured, joint, beyond = match.measured, match.joint(points), match.errors(points).beyond
     unseen = unseen_offsets(match.cells, measured, match.quantiles, points[:, : match.unknowns.inputs].mean(axis=0))
     middle, root = joint.latent(measured.values, measured.learnt)
-    random = np.random.default_rng(seed)
-    latent = middle + (root @ random.standard_normal((*middle.shape, 1)))[:, :, 0]
+    latent = middle + (root @ np.random.default_rng(seed).standard_normal((*middle.shape, 1)))[:, :, 0]
     listed = []
     for place, name in enumerate(names):
         cell = int(np.flatnonzero(measured.output == place)[0])

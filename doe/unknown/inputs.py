@@ -154,8 +154,7 @@ def screening_design(inputs: int) -> Array:
 
     Hadamard's matrix and its mirror image (Plackett and Burman 1946; Box and Wilson 1951 for the fold).
     """
-    size = 1 << int(inputs).bit_length()
-    signs = hadamard(size)[:, 1 : inputs + 1]
+    signs = hadamard(1 << int(inputs).bit_length())[:, 1 : inputs + 1]
     return np.where(np.vstack([signs, -signs]) > 0, HIGH, LOW)
 
 

@@ -290,8 +290,7 @@ def sampled(log_likelihood: LogDensity, inputs: int, seed: int, particles: int =
 
 def effective(log_weights: Array) -> float:
     """Effective sample size: the number of equally weighted particles of the same variance."""
-    weights = _weights(log_weights)[0]
-    return float(1.0 / (weights**2).sum())
+    return float(1.0 / (_weights(log_weights)[0] ** 2).sum())
 
 
 def _weights(logs: Array) -> tuple[Array, float]:

@@ -136,8 +136,7 @@ def power_of(output: Whole, row: Whole, validation: Mask, seed: int) -> Power:
     counts = np.unique(output[np.concatenate(order[start:])], return_counts=True)[1]
     apart = np.random.default_rng(0).chisquare(counts, (TABLES, counts.size))
     sums, freedom = (np.column_stack([parts.sum(axis=1), parts]) for parts in (apart, counts[None]))
-    least = np.sort(_exact_chances(freedom, sums))
-    limit = least[int(REJECTION_LEVEL * TABLES)]
+    limit = np.sort(_exact_chances(freedom, sums))[int(REJECTION_LEVEL * TABLES)]
     # Measured values that scatter half as much as predicted, or twice.
     wide, narrow = (float((_exact_chances(freedom, by * sums) <= limit).mean()) for by in (TWICE**-2, TWICE**2))
     return Power(wide, narrow, int(counts.sum()))

@@ -189,8 +189,7 @@ def border_of(study: Problem) -> Border | None:
     def possible(corners: Array) -> bool:
         try:
             for corner in corners:
-                numbers = study.centre + reach * corner
-                (run,) = study.adaptive_scenes(numbers[None], [Plan.least], 0)
+                (run,) = study.adaptive_scenes((study.centre + reach * corner)[None], [Plan.least], 0)
                 least_mm = min(scene.mounted_clearance_mm for scene in scenes_of(run))
                 if 1e3 * least_mm < study.file.adaptive.least_clearance_um:
                     return False

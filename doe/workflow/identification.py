@@ -182,8 +182,7 @@ class Evidence(Record):
         """Values of each input, and of each key that multiplies one, in the input sets of ``quantiles``."""
         keys = self.keys
         tied = [entry.key for entry in self.case.every if entry.key not in keys and entry.law.times in keys]
-        rows = unknown.table_of(laws_of(self.inputs), self.quantiles)
-        scenes = self.case.scenes(self.inputs, rows, 0)
+        scenes = self.case.scenes(self.inputs, unknown.table_of(laws_of(self.inputs), self.quantiles), 0)
         # A set may be possible at the rig's conditions and impossible in the scene itself.
         return [{key: value_of(scene, key) for key in (*keys, *tied)} for scene in scenes if not isinstance(scene, str)]
 
@@ -346,5 +345,4 @@ def _without(evidence: Evidence, judgement: Judgement, outliers: Sequence[int]) 
     if cells.size in (0, learnt_cells.size):
         return None
     points = reweighed(judgement.particles, cells, evidence.seed)
-    shares = contraction(evidence.match.quantiles(points)).tolist()
-    return dict(zip(evidence.keys, shares, strict=True))
+    return dict(zip(evidence.keys, contraction(evidence.match.quantiles(points)).tolist(), strict=True))

@@ -460,8 +460,7 @@ def strongest_inputs(case: Case, quantiles: Array, signals: Array) -> tuple[list
     They are the inputs that a sample or the scene declares and the most effective others, as many as the scene allows. By
     key of the rest, which vary too: the largest share of a signal's variance by its main effect.
     """
-    required = declared(case)
-    places = unknown.strongest(quantiles[:, :-1], signals, case.uncertain.inputs, required)
+    places = unknown.strongest(quantiles[:, :-1], signals, case.uncertain.inputs, declared(case))
     return places, shares_outside(case, places, quantiles, signals)
 
 

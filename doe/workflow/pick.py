@@ -292,8 +292,7 @@ def _candidates(
     if aware is None:
         yield name, front.points[front.pick], front.pick_reason
     else:
-        point = study.actual(aware.points[aware.pick])
-        yield name, point, aware.pick_reason
+        yield name, study.actual(aware.points[aware.pick]), aware.pick_reason
         yield "without_tolerances", front.points[front.pick], front.pick_reason
     for rule, row in () if front.violations is not None else front.picks.items():
         yield rule, front.points[row], f"selected by {rule}"

@@ -141,8 +141,7 @@ def _lacking(study: Problem, design: Design, rows: list[int]) -> str:
     needed = design.blocks + max(len(terms_of(study, response.model)) for response in study.file.response)
     if len(rows) < needed:
         return f", but the response models need {needed}"
-    terms = all_terms(study)
-    lost = lost_terms(design.coded[rows], terms, design.block[rows])
+    lost = lost_terms(design.coded[rows], all_terms(study), design.block[rows])
     return f", which cannot separate {', '.join(lost)} from the other terms of the response models" if lost else ""
 
 

@@ -113,8 +113,7 @@ def read_scene_table(table: "Path | pd.DataFrame", base: Path | None, overrides:
     sheet = read_sheet(table) if isinstance(table, Path) else sheet_of_frame(table, Path("table"))
     if base is not None:
         read_toml(base)
-    rows = list(_rows(sheet, _keys(sheet, overrides)))
-    return SceneTable(sheet.path, rows, base, overrides, sheet.notes)
+    return SceneTable(sheet.path, list(_rows(sheet, _keys(sheet, overrides))), base, overrides, sheet.notes)
 
 
 def _keys(sheet: InputTable, overrides: Sequence[str]) -> dict[str, str]:

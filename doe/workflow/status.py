@@ -50,8 +50,7 @@ def study_stages(study: Problem, adaptive: bool = False, robust: bool = False) -
     if adaptive:
         from doe.adaptive.search import FRESH
 
-        usual = study.usual_replicates
-        (search,) = study.adaptive_scenes(study.baseline[None], [usual], 0)
+        (search,) = study.adaptive_scenes(study.baseline[None], [study.usual_replicates], 0)
         settings = study.file.adaptive
         runs = max(settings.budget - len(study.design.coded), 0)
         # The shortest search stops after one batch and its fresh runs.
@@ -219,8 +218,7 @@ def study_status(study: Problem, folder: Path) -> dict[str, Any]:
     """Record of ``doe status`` for a study. It only reads, even while the study runs. Raises InputError."""
     region = region_in_store(study, folder)
     ordered = region.plan
-    points = points_of(ordered.scenes, ordered.labels, ordered.factors)
-    content = Content.of(folder, points)
+    content = Content.of(folder, points_of(ordered.scenes, ordered.labels, ordered.factors))
     agenda = content.agenda
     stated_options = agenda.options if agenda else {}
     options = {name: stated_options.get(name, False) for name in ("adaptive", "robust")}
@@ -276,8 +274,7 @@ def status_of(path: Path, folder: Path | None) -> dict[str, Any]:
     """Record of ``doe status`` for a study or a scene, in its own folder by default. Raises InputError."""
     if "bearing" in read_toml(path):
         return scene_status(path, folder or folder_of(path, *SCENE_FOLDERS))
-    study = Problem.load(path)
-    return study_status(study, folder or folder_of(path, "{}_results"))
+    return study_status(Problem.load(path), folder or folder_of(path, "{}_results"))
 
 
 def folder_of(path: Path, *usual: str) -> Path:

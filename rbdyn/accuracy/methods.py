@@ -82,8 +82,7 @@ class Method(NamedTuple):
 def ready_ours(stretch: Stretch, rtol: float) -> Callable[[], Arrived]:
     """As in a simulation, with its tally: works, largest loads, whirl."""
     limits = {"turns": stretch.turns, "discard_turns": 0.0, "step_budget_per_turn": BUDGET_PER_TURN, "method": "rk45"}
-    scene = with_numerics(stretch.scene, **limits)
-    return _over(stretch, Run(scene, stretch.bearing, 0, rtol, Stop()))
+    return _over(stretch, Run(with_numerics(stretch.scene, **limits), stretch.bearing, 0, rtol, Stop()))
 
 
 def _over(stretch: Stretch, run: Run) -> Callable[[], Arrived]:

@@ -194,6 +194,5 @@ def _hashes(files: Iterable[Path]) -> dict[str, str]:
     hashes: dict[str, str] = {}
     for path in dict.fromkeys(files):
         with suppress(InputError):
-            digits = digest_of(read_bytes(path))[:DIGITS]
-            hashes[str(path) if path.name in hashes else path.name] = digits
+            hashes[str(path) if path.name in hashes else path.name] = digest_of(read_bytes(path))[:DIGITS]
     return hashes

@@ -190,8 +190,7 @@ def _balls(scene: BallScene) -> tuple[Array, Any, Any]:
     """Stiffness [N/m] of balls in equilibrium, with the axial place and the tilt of the ring fixed. Raises MethodError without one."""
     from rbdyn.quasistatic.bearing import equilibrium
 
-    report = equilibrium(scene, ranges=False).reached
-    return np.array(report.stiffness["matrix_SI"])[:2, :2], None, None
+    return np.array(equilibrium(scene, ranges=False).reached.stiffness["matrix_SI"])[:2, :2], None, None
 
 
 def over_speed(

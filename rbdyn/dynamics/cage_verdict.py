@@ -60,10 +60,8 @@ def _trial(scene: Scene, run: Replicate) -> Trial:
     turns = _cage_turns(run)
     speed = float(run.cage_angle[run.first :].sum()) / run.duration
     rings = dict(zip(("inner", "outer"), scene.operation.speeds, strict=True))
-    lubricated = scene.model.guide_land == "film"
-    guide = rings.get(scene.cage.guidance, 0.0) / speed if lubricated else 0.0
+    guide = rings.get(scene.cage.guidance, 0.0) / speed if scene.model.guide_land == "film" else 0.0
     energy = 0.5 * scene.geometry.cage_inertia * speed**2
     work = float(run.work[run.first :, RUBBING].sum())
-    orders = tuple(forced_orders(scene, speed).values())
-    forcing = Forcing(orders, 0.5 * (1.0 + guide), work / (turns * energy))
+    forcing = Forcing(tuple(forced_orders(scene, speed).values()), 0.5 * (1.0 + guide), work / (turns * energy))
     return Trial(mean_measures(path, scene.orbit_play_m, samples_per_turn), forcing)

@@ -103,8 +103,7 @@ class History(Brief):
 
     def table(self) -> "pd.DataFrame":
         """A row a sample, units in the column names."""
-        rollers = range(1, self.scene.bearing.rollers + 1)
-        return frame_of(history_sheet(map(str, rollers)).columns, self)
+        return frame_of(history_sheet(map(str, range(1, self.scene.bearing.rollers + 1))).columns, self)
 
 
 def history_sheet(rollers: Iterable[str]) -> Sheet[History]:
@@ -189,8 +188,7 @@ def history(
     bearing = roller_bearing(scene)
     z = bearing.rollers
     length = scene.numerics.warm_up_turns + turns
-    pace = Pace(notice, length, length, 1)
-    run = Run(scene, bearing, replicate, scene.numerics.rtol, stop or Stop(), pace)
+    run = Run(scene, bearing, replicate, scene.numerics.rtol, stop or Stop(), Pace(notice, length, length, 1))
     run.to(scene.numerics.warm_up_turns)
     run.forget()
     states = np.empty((int(turns * per_turn), run.carry.y.size))
@@ -290,8 +288,7 @@ def whirl_ratios(history: History) -> Array:
 
 def whirl_quantiles(history: History) -> dict[float, float]:
     """Quantiles of the instantaneous whirl ratio."""
-    values = np.quantile(whirl_ratios(history), QUANTILES)
-    return dict(zip(QUANTILES, values.tolist(), strict=True))
+    return dict(zip(QUANTILES, np.quantile(whirl_ratios(history), QUANTILES).tolist(), strict=True))
 
 
 def whirl_histogram(history: History, bins: int = 60) -> tuple[Array, Array]:

@@ -436,8 +436,7 @@ def _race_pressure(machine: Machine, path: Path) -> tuple[float, float]:
 
     NaN and 0 where the bearing is impossible there.
     """
-    column = path.figures["radial_um"]
-    row = int(column.argmin())
+    row = int(path.figures["radial_um"].argmin())
     speed, load = (float(value) for value in machine.course.at(path.rows.times[row]))
     point = at_point(machine.scene, max(speed, SLOW * machine.course.speeds.max()), load)
     found = list[tuple[float, float]]()

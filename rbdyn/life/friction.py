@@ -68,8 +68,7 @@ def _moments(
     """M_rr = phi_ish phi_rs G_rr (nu n)^0.6 and M_sl = G_sl mu_sl from the variables G_rr and G_sl of SKF's table 2a."""
     bore, outside, speed, viscosity, _ = running
     mean, flow = 0.5 * (bore + outside), abs(speed) / RPM * viscosity * 1e6
-    starved = starvation_factor(geometry, running)
-    reduction = inlet_heating_factor(mean, speed, viscosity) * starved
+    reduction = inlet_heating_factor(mean, speed, viscosity) * starvation_factor(geometry, running)
     slides = sliding_friction(film_friction, mean, speed, viscosity)
     return FrictionMoments(1e-3 * reduction * rolling * flow**0.6, 1e-3 * sliding * slides)
 

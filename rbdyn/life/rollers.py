@@ -333,8 +333,7 @@ def skf_moments(series: str, running: Running, radial_load: float, axial_load: f
     bore, outside, speed, viscosity, _ = running
     factors, mean = SERIES[series], 0.5 * (bore + outside)
     diameter, flow = mean * 1e3, abs(speed) / RPM * viscosity * 1e6
-    starved = starvation_factor(ROLLER_GEOMETRY, running)
-    reduction = inlet_heating_factor(mean, speed, viscosity) * starved
+    reduction = inlet_heating_factor(mean, speed, viscosity) * starvation_factor(ROLLER_GEOMETRY, running)
     rolling = reduction * factors.rolling * diameter**2.41 * radial_load**0.31 * flow**0.6
     sliding = factors.sliding * diameter**0.9 * axial_load + RADIAL_SLIDING * diameter * radial_load
     slides = sliding_friction(FILM_FRICTION, mean, speed, viscosity)

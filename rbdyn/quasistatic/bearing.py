@@ -92,8 +92,7 @@ def _single_row(scene: SingleRowScene, warm: Solution | None) -> BallResult:
     model = row_of(scene)
     began = time.perf_counter()
     solution = SOLVERS[scene.model.solver](model.row, model.control, load_of(scene), constraint_of(scene), warm)
-    seconds = time.perf_counter() - began
-    base = _base_result(scene, solution.status, seconds)
+    base = _base_result(scene, solution.status, time.perf_counter() - began)
     if not solution.is_equilibrium:
         return base
     rating = Rating(scene.bearing, model, reference_capacities(scene.bearing), scene.operation.speeds)
@@ -150,8 +149,7 @@ def _double_decker(scene: DoubleDeckerScene, starts: tuple[Solution, ...]) -> Ba
     warm = (starts[0], starts[1]) if len(starts) == 2 else None
     began = time.perf_counter()
     solution = solve_double_decker(model.stack, load_of(scene), constraint_of(scene), model.middle_constraint, warm)
-    seconds = time.perf_counter() - began
-    base = _base_result(scene, solution.status, seconds)
+    base = _base_result(scene, solution.status, time.perf_counter() - began)
     if not solution.is_equilibrium:
         return base
     rows = solution.inner, solution.outer

@@ -189,8 +189,7 @@ def solve_double_decker(
     starts += [_shared_displacement(stack, load, constraint, middle_constraint, share) for share in SHARES]
     best: DoubleDeckerSolution | None = None
     for first in starts:
-        middle = np.where(free, first, middle_constraint)
-        reached = _follow(stack, load, constraint, free, middle, start)
+        reached = _follow(stack, load, constraint, free, np.where(free, first, middle_constraint), start)
         if reached.is_equilibrium:
             return reached
         if best is None or reached.residual < best.residual:

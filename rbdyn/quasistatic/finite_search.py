@@ -143,8 +143,7 @@ def _search(
 
     Returns the last outcome, the searches, the iterations and the largest residual [N] there.
     """
-    row = system.row
-    z = row.cosine.size
+    z = system.row.cosine.size
     best, least = u.copy(), math.inf
     outcome, searches, iterations = EXHAUSTED, 0, 0
     for n in range(points.shape[0]):

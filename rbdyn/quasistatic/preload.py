@@ -114,8 +114,7 @@ def scan(case_at: Callable[[float], Case], values: Sequence[float], name: str, u
 
     least = refined(lambda point: point.peak_pressure)
     longest = refined(lambda point: -point.million_turns)
-    notes = _notes(balanced, least, longest, name, unit, scale)
-    return Scan(tuple(points), least, longest, notes)
+    return Scan(tuple(points), least, longest, _notes(balanced, least, longest, name, unit, scale))
 
 
 def _notes(points: Sequence[Point], least: Point, longest: Point, name: str, unit: str, scale: float) -> Notes:

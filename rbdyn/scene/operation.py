@@ -100,8 +100,7 @@ class Operation(Consistent):
     def largest_load_N(self) -> float:  # noqa: N802
         """Largest load along x at any time, with the rotating load in the same direction [N]."""
         scheduled = (self.schedule.radial_load_N if self.schedule else None) or [self.radial_load_N]
-        fastest = self.fastest_inner_speed
-        return max(scheduled) + self.rotating_load_N + self.unbalance * fastest**2
+        return max(scheduled) + self.rotating_load_N + self.unbalance * self.fastest_inner_speed**2
 
     @property
     def turn_s(self) -> float:

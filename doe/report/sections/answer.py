@@ -339,8 +339,7 @@ def _limits_judged(summary: Summary) -> Table:
                 f"{LIMITS[base.verdict][:1]} {with_error(base.value, base.error)}{classes[0]}",
             )
         )
-    shares = "met over unknown inputs [%]"
-    header = ("limit", "selected", "verdict", "probability", shares, "baseline")
+    header = ("limit", "selected", "verdict", "probability", "met over unknown inputs [%]", "baseline")
     return Table("Limits judged by simulation", header, rows, text_columns=(2,))
 
 

@@ -155,8 +155,7 @@ def _rheology(scene: Scene, oil: Oil, race: str = "outer") -> "Rheology":
         temperature = getattr(scene.film_temperatures_C, race)
         return thermal_newtonian(name, temperature, oil.conductivity, table.largest_shear_ratio)
     if table.model == "eyring":
-        stress = table.eyring_stress
-        return Eyring(oil.viscosity, oil.pressure_coefficient, stress, table.largest_shear_ratio)
+        return Eyring(oil.viscosity, oil.pressure_coefficient, table.eyring_stress, table.largest_shear_ratio)
     return LimitingShear(oil.viscosity, oil.pressure_coefficient, table.limiting_shear_ratio)
 
 

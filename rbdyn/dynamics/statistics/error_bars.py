@@ -129,8 +129,7 @@ def start_of_counting(scene: Scene, runs: Runs) -> Start:
     turns = round(float(run.durations[:transient].sum()) / scene.turn_s, 6)
     if numerics.discard_turns == "auto":
         # At least one impact window counts.
-        first = min(transient, len(run.durations) - run.per_window)
-        return Start(first, turns, ())
+        return Start(min(transient, len(run.durations) - run.per_window), turns, ())
     return Start(run.first, turns, ())
 
 

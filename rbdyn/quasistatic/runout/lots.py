@@ -202,8 +202,7 @@ def _ball_waves(
     z = parts.diameter.shape[1]
     around = np.exp(2j * math.pi * np.arange(z) / z)
     # A larger ball reduces both reaches by half of its excess.
-    half = -0.5 * (parts.diameter @ around)
-    coefficients = [half]
+    coefficients = [-0.5 * (parts.diameter @ around)]
     gains = [(response.radial[2:].sum(), response.tilt[2:].sum(), 0.0)]
     waves = [np.exp(1j * cage)]
     for k, order in enumerate(parts.sphericity_order):
@@ -349,8 +348,7 @@ def runouts(read: Readings, limits: Sequence[float] | Array) -> tuple[Array, Arr
 
 def full_runouts(bench: Bench, parts: Parts, limits: Array, bearing: int) -> tuple[float, float]:
     """Radial and face runout [m] of one bearing of a lot by full equilibria, read as in ``readings``."""
-    errors = bearing_errors(parts, bearing, limits)
-    path = ball_path(errors, bench.turning, bench.steps, bench.turns)
+    path = ball_path(bearing_errors(parts, bearing, limits), bench.turning, bench.steps, bench.turns)
     place = follow(bench.row, bench.control, bench.load, path, bench.turns, bench.constraint).path
     return float(np.ptp(place[:, 0])), float(np.ptp(place[:, 2] - bench.face_radius * place[:, 4]))
 
