@@ -17,7 +17,7 @@ from rbdyn.base.records import Record
 from rbdyn.base.words import quantity
 from rbdyn.clearances import REPORTED
 from rbdyn.dynamics.forces import state
-from rbdyn.dynamics.statistics.metrics import FEWEST_WINDOWS, RETURN_FORCE, RETURN_WINDOWS, is_fitted, least_windows
+from rbdyn.dynamics.statistics.extremes import FEWEST_WINDOWS, RETURN_FORCE, RETURN_WINDOWS, is_fitted, least_windows
 from rbdyn.dynamics.statistics.replicate import Replicate, Statistic, mean, timed, windowed
 from rbdyn.result import START_FIGURES, TEMPERATURES
 from rbdyn.scene.laws import SLOWEST_CAGE

@@ -24,7 +24,8 @@ from rbdyn.dynamics.part_figures import part_figures, races_of
 from rbdyn.dynamics.recording import Ensemble, recording_of, run_until_settled, whole_windows
 from rbdyn.dynamics.run import explicit_method, prepare, stiffness_cost, stiffness_notes
 from rbdyn.dynamics.statistics.error_bars import error_notes, quantities
-from rbdyn.dynamics.statistics.metrics import TIGHT, return_force_notes, whirl_notes, work_done
+from rbdyn.dynamics.statistics.extremes import return_force_notes
+from rbdyn.dynamics.statistics.metrics import TIGHT, whirl_notes, work_done
 from rbdyn.losses import POWER_TERMS
 from rbdyn.mounting.cage import OperatingClearance
 from rbdyn.result import SimulationResult

@@ -22,7 +22,7 @@ from rbdyn.dynamics.figures import DAMAGE, sliding_over_track
 from rbdyn.dynamics.forces.state import CAGE_ANGLE, ENTRY_SLIPS, SAMPLES_NUMBER
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.run import Run
-from rbdyn.dynamics.statistics.metrics import (
+from rbdyn.dynamics.statistics.extremes import (
     LARGEST_DISTANCE,
     RETURN_WINDOWS,
     chance_of_one_law,
