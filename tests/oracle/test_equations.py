@@ -69,6 +69,7 @@ VARIANTS = {
         "traction.model=coulomb",
         "model.pocket_bar_stiffness_N_m=rigid",
         "model.guide_land=dry",
+        UNSAMPLED,
     ),
     "lips, blended, undamped, both rings turn": (
         "cage.guidance=roller",
@@ -80,8 +81,9 @@ VARIANTS = {
         "model.pocket_damping_alpha_s_m=0.0",
         "model.rolling_resistance=off",
         "model.drag=off",
+        UNSAMPLED,
     ),
-    "one race wavy": ("bearing.outer_waviness=[{order=2, amplitude_um=10.0, phase_deg=30.0}]",),
+    "one race wavy": (UNSAMPLED, "bearing.outer_waviness=[{order=2, amplitude_um=10.0, phase_deg=30.0}]"),
     "everything": EVERYTHING,
 }
 SUPPORT = ("support.stiffness_N_m=2e7", "support.damping_N_s_m=5e3")

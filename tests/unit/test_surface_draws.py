@@ -172,9 +172,12 @@ def stated_and_true(study, random, noise, samples):
 @pytest.mark.slow
 @pytest.mark.parametrize("noise", [0.1, 0.3])
 def test_invariant_the_interval_holds_the_true_share_of_parts(tmp_path, noise):
-    """Invariant: in more than 90 of 100 repeats of the design, where the count of the parts alone held it in fewer than 40."""
+    """Invariant: in more than 90 of 100 repeats of the design, where the count of the parts alone held it in fewer than 40.
+
+    An interval that holds it in 80 of 100 passes 60 repeats in 3 % of the cases, a count that holds it in half of them in 5 %.
+    """
     study, random = Problem.load(short_study(tmp_path)), np.random.default_rng(11)
-    rows = [stated_and_true(study, random, noise, 2048) for _ in range(120)]
+    rows = [stated_and_true(study, random, noise, 2048) for _ in range(60)]
     held = np.mean([low <= true <= high for _, _, (low, high), true in rows])
     before = np.mean([abs(share - true) <= half for share, half, _, true in rows])
     # The draws include the model error of the surfaces, which these have not, so that all repeats may hold it.
