@@ -18,9 +18,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from rbdyn.accuracy import fixed_step
 from rbdyn.base.faults import read_toml
-from rbdyn.compiled.kernel import entry
-from rbdyn.dynamics.forces.equations import derivative
 from rbdyn.dynamics.forces.race_lanes import scratch
 from rbdyn.dynamics.forces.state import LOADS
 from rbdyn.dynamics.parameters.state import layout_of
@@ -149,18 +148,12 @@ def make(*assignments: str) -> Scene:
     return Scene.from_dict(read_toml(EXAMPLE), "scene", (*SHORT, *assignments))
 
 
-@entry
-def compiled_right_hand_side(bearing: Any, y: Any, dy: Any, power: Any, loads: Any, work: Any) -> None:
-    """The right-hand side, its machine code kept on disk."""
-    derivative(bearing, y, 0, dy, power, loads, work)
-
-
 def right_hand_side(bearing: Any, y: NDArray[np.float64]) -> Outcome:
     """The right-hand side under test; the work space is poisoned so that nothing stale can pass for a result."""
     dy, power, loads = (np.full((1, size), np.nan) for size in (y.size, POWERS, LOADS))
     work = scratch(bearing.rollers)
     work.lanes[:] = work.gap[:] = np.nan
-    compiled_right_hand_side(bearing, y, dy, power, loads, work)
+    fixed_step.right_hand_side(bearing, y, dy, power, loads, work)
     return Outcome(dy[0], power[0], loads[0])
 
 

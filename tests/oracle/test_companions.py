@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from conftest import UNSAMPLED
 
 from rbdyn.contact.damping import damped_load
 from rbdyn.dynamics.ensemble import Stop
@@ -76,7 +77,7 @@ def test_oracle_damping_of_the_implicit_method():
 def test_oracle_damping_of_a_light_contact(law, make_scene):
     """Oracle: the damping ratio is c/(2 sqrt(k m)), by differences of the load that the race's own law gives about the approach
     at which it bears the centrifugal force."""
-    scene = make_scene(*SLOW, *law)
+    scene = make_scene(*SLOW, *law, UNSAMPLED)
     light, mass, force = light_contact(scene), scene.geometry.roller_mass, scene.geometry.centrifugal_force
     stiffness = light.frequency**2 * mass
     approach = 10.0 / 9.0 * force / stiffness

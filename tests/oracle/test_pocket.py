@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from conftest import UNSAMPLED
 from film_oracle import complementary_film, quadrature_shape
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
@@ -297,7 +298,7 @@ def test_unit_scene_makes_the_pocket(make_scene):
 
     scene = make_scene(
         "cage.guidance=roller", "cage.pocket_radial_clearance_mm=0.06", "model.pocket_film=true",
-        "model.pocket_film_floor_um=1.5", "model.pocket_fill=0.5", "model.pocket_restitution=0.6",
+        "model.pocket_film_floor_um=1.5", "model.pocket_fill=0.5", "model.pocket_restitution=0.6", UNSAMPLED,
     )  # fmt: skip
     pocket = roller_bearing(scene).pocket
     assert isinstance(pocket, LippedPocket) and isinstance(pocket.walls, LubricatedPocket)
@@ -307,8 +308,8 @@ def test_unit_scene_makes_the_pocket(make_scene):
     assert pocket.walls.film.floor == pytest.approx(1.5e-6)
     alpha = alpha_of_restitution(0.6, 0.5)
     assert pocket.damping.alpha == pocket.walls.walls.damping.alpha == pytest.approx(alpha, rel=1e-12)
-    half = roller_bearing(make_scene("model.pocket_film=true", "model.pocket_fill=0.5")).pocket.film
-    full = roller_bearing(make_scene("model.pocket_film=true")).pocket.film
+    half = roller_bearing(make_scene("model.pocket_film=true", "model.pocket_fill=0.5", UNSAMPLED)).pocket.film
+    full = roller_bearing(make_scene("model.pocket_film=true", UNSAMPLED)).pocket.film
     scales = ("load", "rolling", "shear")
     assert [2.0 * getattr(half, name) for name in scales] == pytest.approx(
         [getattr(full, name) for name in scales], rel=1e-12

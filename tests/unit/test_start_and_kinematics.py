@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from conftest import ROOT
+from conftest import ROOT, UNSAMPLED
 from numpy_twin import race_overlap
 from numpy_twin_laws import race_load, raceways, roller_errors
 from scipy.optimize import brentq
@@ -210,9 +210,9 @@ def test_unit_geometry_of_guides(make_scene, outer, inner):
     assert outside.dry.play == pytest.approx(72e-6)
     # m (D^2 + d^2)/8 with 49.5 and 40.5 mm.
     assert outer.geometry.cage_inertia == pytest.approx(0.045 * (49.5e-3**2 + 40.5e-3**2) / 8.0, rel=1e-12)
-    dry = roller_bearing(make_scene("model.guide_land=dry")).guide
+    dry = roller_bearing(make_scene("model.guide_land=dry", UNSAMPLED)).guide
     assert type(dry.film) is NoFilm and dry.dry.play == pytest.approx(75e-6)
-    assert type(roller_bearing(make_scene("cage.guidance=roller")).guide) is NoGuide
+    assert type(roller_bearing(make_scene("cage.guidance=roller", UNSAMPLED)).guide) is NoGuide
     assert type(roller_bearing(outer).pocket.contact) is LineContactOnBar
 
 
@@ -232,7 +232,7 @@ def test_invariant_what_a_scene_fixes_is_worked_out_once(monkeypatch):
     for module, name in ((fits, "operating_clearance"), (scale_module, "slip_scale")):
         real = getattr(module, name)
         monkeypatch.setattr(module, name, lambda *given, name=name, real=real: [calls.append(name), real(*given)][1])
-    scene = Scene.load(ROOT / "examples" / "all_options.toml", ["traction.elasticity=false"])
+    scene = Scene.load(ROOT / "examples" / "all_options.toml", ["traction.elasticity=false", UNSAMPLED])
     bearing = roller_bearing(scene)
     for replicate in range(3):
         run = Run(scene, bearing, replicate, 1e-2, Stop())
@@ -242,9 +242,9 @@ def test_invariant_what_a_scene_fixes_is_worked_out_once(monkeypatch):
     tighter = scene.bearing.model_copy(update={"radial_clearance_mm": scene.bearing.radial_clearance_mm - 0.01})
     copied = scene.model_copy(update={"bearing": tighter})
     assert scene.geometry.clearance - copied.geometry.clearance == pytest.approx(1e-5, rel=1e-9)
-    assert scene == Scene.load(ROOT / "examples" / "all_options.toml", ["traction.elasticity=false"]) != copied, (
-        "what was worked out is no part of a scene"
-    )
+    assert (
+        scene == Scene.load(ROOT / "examples" / "all_options.toml", ["traction.elasticity=false", UNSAMPLED]) != copied
+    ), "what was worked out is no part of a scene"
 
 
 def test_unit_keys_in_si():
