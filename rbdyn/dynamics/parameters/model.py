@@ -4,6 +4,7 @@ Parts that only some scenes need are imported where they are built, so that a sc
 """
 
 import math
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -124,12 +125,25 @@ def _load_independent(scene: Scene) -> Any:
 
 
 def _surface(scene: Scene, race: str, contact: film_thickness.RollingContact, oil: Oil, largest_load: float) -> Any:
+    fit = _film_table(_rheology(scene, oil, race), contact, oil, scene.lubricant.inlet_distance, largest_load)
+    if fit.error > LARGEST_ERROR:
+        raise InputError(
+            f"traction.model = '{scene.traction.model}': its table is off by {100.0 * fit.error:.2g} % of the peak up to "
+            f"{largest_load:.4g} N; raise lubricant.temperature_C or choose another model"
+        )
+    return fit.surface
+
+
+# The designs of a study share most of their tables, which take 25 ms each.
+@lru_cache(maxsize=64)
+def _film_table(
+    rheology: "Rheology", contact: film_thickness.RollingContact, oil: Oil, distance: float | None, largest_load: float
+) -> traction.SurfaceFit:
+    """Table of the traction coefficient of a film, with the inlet ``distance`` of its oil."""
     from rbdyn.contact.rheology import traction_coefficient, with_body_creep
 
-    rheology = _rheology(scene, oil, race)
-
     def coefficient(slip: Any, load: Any) -> Any:
-        film = film_thickness.film_in_service(contact, oil, load, scene.lubricant.inlet_distance)
+        film = film_thickness.film_in_service(contact, oil, load, distance)
         alone = traction_coefficient(rheology, contact, slip, load, film)
         return with_body_creep(alone, contact, slip, load)
 
@@ -137,13 +151,7 @@ def _surface(scene: Scene, race: str, contact: film_thickness.RollingContact, oi
     largest_load = min(largest_load, capacity / contact.equivalent_modulus)
     smallest_load = min(film_thickness.lightest_load(contact, oil), largest_load / SMALLEST_RANGE)
     largest_slip = LARGEST_SLIP_RATIO * contact.entrainment_speed
-    fit = traction.traction_surface(coefficient, largest_load, smallest_load, largest_slip)
-    if fit.error > LARGEST_ERROR:
-        raise InputError(
-            f"traction.model = '{scene.traction.model}': its table is off by {100.0 * fit.error:.2g} % of the peak up to "
-            f"{largest_load:.4g} N; raise lubricant.temperature_C or choose another model"
-        )
-    return fit.surface
+    return traction.traction_surface(coefficient, largest_load, smallest_load, largest_slip)
 
 
 def _rheology(scene: Scene, oil: Oil, race: str = "outer") -> "Rheology":
