@@ -1,7 +1,6 @@
 """Pareto fronts: search, picks, errors.
 
-- ``search``: costs of responses, rules that pick a point of a front, dominance, hypervolume, archive, and the search of a front
-- ``evolution``: NSGA-II on arrays
+- ``search``: costs of responses, rules that pick a point of a front, dominance, hypervolume, archive, and NSGA-II on cheap responses
 - ``front``: fronts of fitted surfaces with the effect of their errors, and fronts of simulated points
 - ``manufacture``: responses of parts within tolerances, robust costs, and their front
 - ``tolerance``: the widest tolerances that keep the gains of a pick, and the tolerances of a simulated front

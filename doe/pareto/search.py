@@ -22,7 +22,6 @@ from typing import Any, Literal, NamedTuple, Self, get_args
 import numpy as np
 from scipy.stats import qmc
 
-from doe.pareto.evolution import evolve
 from rbdyn.base.arrays import Array, Mask, Rows
 from rbdyn.base.faults import MethodError
 from rbdyn.base.records import Record
@@ -212,7 +211,7 @@ def search(judge: Judge, low: Array, high: Array, population: int, generations: 
 
     Raises InfeasibleError when no evaluated point keeps all limits.
     """
-    history = _evolved(judge, low, high, population, generations, seed)
+    history = _evolve(judge, low, high, population, generations, seed)
     allowed = [(judged.violations <= 0.0).all(axis=1) for _, judged in history]
     count = sum(len(points) for points, _ in history)
     if not any(rows.any() for rows in allowed):
@@ -245,18 +244,27 @@ def _scale(violations: Array) -> Array:
     return np.where(largest > 0.0, largest, 1.0)
 
 
-def _evolved(judge: Judge, low: Array, high: Array, population: int, generations: int, seed: int) -> History:
+def _evolve(judge: Judge, low: Array, high: Array, population: int, generations: int, seed: int) -> History:
+    from pymoo.algorithms.moo.nsga2 import NSGA2
+    from pymoo.core.problem import Problem
+    from pymoo.optimize import minimize
+
     history: History = []
     # The scale of the violations comes from points all over the box.
     sample = judge(np.random.default_rng(seed).uniform(low, high, (population, low.size)))
     scale = _scale(sample.violations)
 
-    def evaluate(points: Array) -> tuple[Array, Array]:
-        judged = judge(points)
-        history.append((points, judged))
-        return judged.costs, np.maximum(judged.violations / scale, 0.0).sum(axis=1)
+    class Recorded(Problem):
+        def _evaluate(self, x: Array, out: dict[str, Array]) -> None:
+            judged = judge(x)
+            out["F"] = judged.costs
+            if scale.size:
+                out["G"] = judged.violations / scale
+            history.append((x.copy(), Judged(judged.costs.copy(), judged.violations.copy())))
 
-    evolve(evaluate, low, high, population, generations, seed)
+    count = sample.costs.shape[1]
+    problem = Recorded(n_var=low.size, n_obj=count, n_ieq_constr=scale.size, xl=low, xu=high)
+    minimize(problem, NSGA2(pop_size=population), ("n_gen", generations), seed=seed)
     return history
 
 
