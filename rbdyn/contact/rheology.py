@@ -29,6 +29,9 @@ class Rheology(Protocol):
     def stress(self, pressure: Any, slip: Any, film: Any) -> Any:
         """Shear stress [Pa] at a pressure [Pa] > 0, a slip [m/s] >= 0 and a film thickness [m]."""
 
+    def __hash__(self) -> int:
+        """Of its constants, by which a table of tractions is known."""
+
 
 class OilConstants(NamedTuple):
     """Gupta, Flamand, Berthe and Godet 1981: viscosity and its thermal coefficient inside a traction contact.
