@@ -14,7 +14,7 @@ from rbdyn.scene.duty import duty_scenes, read_duty, starting
 from rbdyn.scene.thermal import point_before
 
 # Simulations of the heat alone, long enough for it.
-QUICK = {"turns": 20.0, "discard_turns": 10.0, "replicates": 2, "extend": False, "companion": False}
+QUICK = {"turns": 10.0, "discard_turns": 5.0, "replicates": 2, "extend": False, "companion": False}
 
 
 @pytest.fixture(scope="module")
@@ -29,35 +29,32 @@ def duty(folder, text):
     return path
 
 
-def test_starts_of_points(scene, tmp_path):
-    """From an equal point nothing moves; from ambient as by [thermal.start]; from a slower point less clearance is lost than cold."""
-    text = "same,0.2,rated,4000\nslow,0.2,,2000\nrated,0.2,ambient,4000\nfaster,0.4,slow,4000\n"
-    found = simulate_duty(scene, duty(tmp_path, text), workers=2, notice=None)
+@pytest.fixture(scope="module")
+def found(scene, tmp_path_factory):
+    """Points that start from an equal one, not, cold, and from each other."""
+    text = "same,0.2,rated,4000\nslow,0.2,,2000\nrated,0.2,ambient,4000\nfast,0.2,idle,4000\nidle,0.2,fast,2000\n"
+    return simulate_duty(scene, duty(tmp_path_factory.mktemp("duty"), text), workers=2, notice=None)
+
+
+def test_starts_of_points(scene, found):
+    """From an equal point nothing moves; from ambient as by [thermal.start]; from a slower point less clearance is lost than cold;
+    from a faster one, which cools, the rings come nearer, and nothing is lost."""
     points = {point.name: point for point in found.points}
-    assert found.status == "ok" and list(points) == ["same", "slow", "rated", "faster"] and points["slow"].start is None
+    assert found.status == "ok" and list(points) == ["same", "slow", "rated", "fast", "idle"]
+    assert [point.start and point.start.origin for point in found.points] == ["rated", None, "ambient", "idle", "fast"]
     steady = points["rated"].figures["radial_operating_clearance_um"].value
-    same, rated, faster = (points[name].start for name in ("same", "rated", "faster"))
+    same, rated, fast, idle = (points[name].start for name in ("same", "rated", "fast", "idle"))
     assert same.radial_um.least.value == pytest.approx(steady, abs=0.5) and same.time_to_steady_s < 100.0
     alone = simulate(starting(scene.overridden(["operation.inner_speed_rpm=4000"])), workers=2, notice=None)
     assert (
         rated.radial_um.least == alone.start.radial_um.least and rated.time_to_steady_s == alone.start.time_to_steady_s
     )
-    assert rated.radial_um.least.value + 2.0 < faster.radial_um.least.value < steady - 0.5
-    assert [point.start and point.start.origin for point in found.points] == ["rated", None, "ambient", "slow"]
+    assert rated.radial_um.least.value + 2.0 < fast.radial_um.least.value < steady - 0.5
+    # Short runs gave the temperatures of the fast point.
+    assert idle.radial_um.least.value > steady - 1.0
     again = DutySimulation.from_dict(found.as_dict())
     assert again.points == found.points and found.as_dict()["points"][0]["start"]["from"] == "rated"
-    table = found.table()
-    assert table["start_from"][2] == "ambient"
-
-
-def test_points_that_start_from_each_other(scene, tmp_path):
-    """Each begins at the steady temperatures of the other: the slower one cools, so its rings come nearer, and nothing is lost."""
-    found = simulate_duty(scene, duty(tmp_path, "slow,0.5,fast,2000\nfast,0.5,slow,4000\n"), workers=2, notice=None)
-    slow, fast = (point.start for point in found.points)
-    steady = [point.figures["radial_operating_clearance_um"].value for point in found.points]
-    assert found.status == "ok" and fast.radial_um.least.value < steady[1] - 0.5
-    # Short runs gave the temperatures of the fast point.
-    assert slow.radial_um.least.value > steady[1] - 1.0
+    assert found.table()["start_from"][2] == "ambient"
 
 
 @pytest.mark.parametrize(
