@@ -170,7 +170,8 @@ class Fronts(Record):
     def _legend(self) -> Still:
         """What the marks of the pictures mean; a hollow mark is the same point, simulated."""
         count = len(self.sets) + len(self.marks) + bool(self.confirmed) + bool(self.limits)
-        height = 20.0 + LEGEND_ROW * -(-count // 2)
+        longest = max((len(wrapped(name).splitlines()) for name in self.marks), default=1)
+        height = 20.0 + LEGEND_ROW * (-(-count // 2) + longest - 1)
         words = "Marks of the pictures of the front"
         return Still(words, self._draw_legend, height=height, left_margin=4.0, bottom_margin=4.0)
 
@@ -188,7 +189,7 @@ class Fronts(Record):
             )
         for name in self.marks:
             marker, size, colour = MARKS.get(name, OTHER)
-            look = {"color": COLOURS[colour], "markersize": size, "label": point_words(name)}
+            look = {"color": COLOURS[colour], "markersize": size, "label": wrapped(name)}
             handles.append(Line2D([], [], linestyle="", marker=marker, **look))
         if self.confirmed:
             hollow: dict[str, Any] = {"markerfacecolor": COLOURS["paper"], "markersize": 8.0, "color": COLOURS["ink"]}
@@ -342,7 +343,13 @@ RUN_MARKS = {
 AREA = 7.0  # of a run of one replicate [pt²]
 # Size of a picture with a legend beneath, where no point lies, and letters in a line of it.
 HIGH, BOTTOM, LETTERS = 338.0, 112.0, 56
+HALF = 24  # letters in a line of one of two columns
 BENEATH: dict[str, Any] = {"loc": "upper center", "bbox_to_anchor": (0.45, -0.17)}
+
+
+def wrapped(name: str) -> str:
+    """The words of a point in lines that one of two columns of a legend can hold."""
+    return fill(point_words(name), HALF)
 
 
 def spent_runs(summary: Summary, adaptive: SearchResult) -> Runs:
