@@ -31,7 +31,7 @@ from rbdyn.scene.bearing import Harmonic
 from rbdyn.scene.lubricant import RHEOLOGIES
 
 if TYPE_CHECKING:
-    from rbdyn.contact.rheology import Eyring, LimitingShear, ThermalNewtonian
+    from rbdyn.contact.rheology import Rheology
     from rbdyn.dynamics.forces.schedule import ClockedDrive
 
 
@@ -137,11 +137,7 @@ def _surface(scene: Scene, race: str, contact: film_thickness.RollingContact, oi
 # The designs of a study share most of their tables, which take 25 ms each.
 @lru_cache(maxsize=64)
 def _film_table(
-    rheology: "Eyring | LimitingShear | ThermalNewtonian",
-    contact: film_thickness.RollingContact,
-    oil: Oil,
-    distance: float | None,
-    largest_load: float,
+    rheology: "Rheology", contact: film_thickness.RollingContact, oil: Oil, distance: float | None, largest_load: float
 ) -> traction.SurfaceFit:
     """Table of the traction coefficient of a film, with the inlet ``distance`` of its oil."""
     from rbdyn.contact.rheology import traction_coefficient, with_body_creep
@@ -158,7 +154,7 @@ def _film_table(
     return traction.traction_surface(coefficient, largest_load, smallest_load, largest_slip)
 
 
-def _rheology(scene: Scene, oil: Oil, race: str = "outer") -> "Eyring | LimitingShear | ThermalNewtonian":
+def _rheology(scene: Scene, oil: Oil, race: str = "outer") -> "Rheology":
     from rbdyn.contact.rheology import Eyring, LimitingShear, thermal_newtonian
 
     table = scene.traction
