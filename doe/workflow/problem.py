@@ -28,10 +28,15 @@ from rbdyn.result import TEMPERATURES
 from rbdyn.scene import Scene
 from rbdyn.scene.thermal import Near, begun_near, first_guess_faults
 from rbdyn.scene.unknown import plain_values
+from rbdyn.thermal.losses import gain
 
 if TYPE_CHECKING:
     from doe.pareto import Goals
     from doe.response_surface import Surface
+
+
+# Gain of the loop of heat in the middle of the region, up to which no design of the region is near losing its balance.
+SLIGHT_GAIN = 0.2
 
 
 class RunPlan(Record):
@@ -391,11 +396,14 @@ class Problem(Study):
     def confirmation_run(self, point: Array, *, in_brief: bool = False) -> Run:
         """Scenes of a confirmation run: more replicates and companions, with seeds of their own.
 
-        ``in_brief``: as few replicates as a design run, alone, with heat balances that begin as those do.
+        ``in_brief``: as few replicates as a design run, alone, with heat balances that begin as those do. Others measure the gain of
+        their own loop, unless that in the middle of the region is slight.
         """
         scene = partial(self._confirmation_scene, point, in_brief=in_brief)
         run = self.over_duty(scene, self.baseline_scenes, baseline_errors=True)
-        return self._begun(run) if in_brief else run
+        slight = all(gain(np.array(near.slopes)) <= SLIGHT_GAIN for near in self.near.values())
+        # Ratios to the baseline are to the runs that confirm it.
+        return self._begun(run) if in_brief or (slight and not self.baseline_scenes) else run
 
     def confirmation_scene(self, point: Array) -> Scene:
         """Scene of a confirmation run; over a duty, that at the point with the largest share of the time."""

@@ -304,8 +304,8 @@ def test_heat_balances_are_made_once_and_resumed(tmp_path, monkeypatch):
 
 
 def test_balances_of_design_runs_begin_in_the_middle_of_the_region(tmp_path, monkeypatch):
-    """The scenes and keys of design runs have its temperatures and slopes, rounded; those of confirmations have none unless in brief,
-    and the store tells the same keys again."""
+    """The scenes and keys of design runs have its temperatures and slopes, rounded; so have those of confirmations in brief, or where
+    the gain of the loop is slight. The store tells the same keys again."""
     study, slopes = heated_study(tmp_path), (-0.123456 * np.eye(4)).tolist()
     heats(monkeypatch, slopes=slopes)
     region = region_that_runs(study, tmp_path, 1).study
@@ -313,7 +313,11 @@ def test_balances_of_design_runs_begin_in_the_middle_of_the_region(tmp_path, mon
         near = scene.thermal.near
         assert near.slopes[1] == [0.0, -0.12, 0.0, 0.0] and near.temperatures_C == [HEATED[name] for name in HEATED]
         assert Scene.from_dict(scene.model_dump(mode="json")).model_dump_json() == scene.model_dump_json()
-    assert region.confirmation_run(region.baseline).thermal.near is None
+    for share, begins in ((1.0, True), (-4.0, False)):
+        at_gain = replace(
+            region, near={"": near.model_copy(update={"slopes": (share * np.array(near.slopes)).tolist()})}
+        )
+        assert (at_gain.confirmation_run(region.baseline).thermal.near is not None) == begins
     assert region.confirmation_run(region.baseline, in_brief=True).thermal.near == near
     (adaptive,) = region.adaptive_scenes(region.baseline[None], [2], 0)
     assert adaptive.thermal.near == near
