@@ -153,7 +153,7 @@ def new(
             if moved is not study:
                 sections["baseline"], factors = _baseline(moved), _moved(factors, study, moved)
                 text, study = written(factors)
-            if _is_held(baseline_cages(study, Path(folder), effort)):
+            if {cage.name for cage in baseline_cages(study, Path(folder), effort).values()} == {"held"}:
                 sections["responses"] = HELD + _responses(limits, {WHIRL: IMPACT_POWER}) + class_limit
                 text, study = written(factors)
         check_study(study)
@@ -195,11 +195,6 @@ def baseline_cages(study: "Problem", folder: Path, effort: "Effort") -> "dict[st
     with effort.simulations(folder, study.path) as simulations:
         (result,) = simulations.run([run], ["baseline"], simulations.progress("class of the cage"))
     return {} if isinstance(result, Failure) else cages_of(result)
-
-
-def _is_held(cages: "Mapping[str, CageVerdict]") -> bool:
-    """Whether the cage is held, at every point of a duty."""
-    return bool(cages) and all(cage.name == "held" for cage in cages.values())
 
 
 def limits_of(texts: Sequence[str]) -> Limits:

@@ -171,7 +171,8 @@ def _impossible_conditions(cases: Sequence[Case], rig: Rig) -> dict[str, None]:
     faults = dict.fromkeys(fault for condition in cases for fault in impossible(condition))
     conditions, rows = rig.conditions, list[tuple[int, float, float]]()
     for row in rig.rows:
-        fastest = _fastest_ring(cases[conditions.index(row.keys)].scene)
+        rings = cases[conditions.index(row.keys)].scene.operation
+        fastest = max(abs(rings.inner_speed_rpm), abs(rings.outer_speed_rpm))
         if row.values.get(SPEED, 0.0) > fastest:
             rows.append((row.number, row.values[SPEED], fastest))
     if rows:
@@ -181,11 +182,6 @@ def _impossible_conditions(cases: Sequence[Case], rig: Rig) -> dict[str, None]:
         )
         faults[f"{where} ({len(rows)} of {len(rig.rows)} rows); check the columns and the unit"] = None
     return faults
-
-
-def _fastest_ring(scene: Scene) -> float:
-    """The speed [rpm] of the faster ring."""
-    return max(abs(scene.operation.inner_speed_rpm), abs(scene.operation.outer_speed_rpm))
 
 
 def cases_of(case: Case, rig: Rig) -> list[Case]:

@@ -449,7 +449,7 @@ def one_roller(bearing: RollerBearing, size: int) -> OneRoller:
     moved = ROLLER_STATES * (bearing.rollers - 1)
     single = bearing._replace(
         rollers=1,
-        sizes=_room_for_one(bearing.sizes),
+        sizes=bearing.sizes if isinstance(bearing.sizes, EqualRollers) else UnequalRollers(np.zeros(VECTOR)),
         pocket_cos=np.ones(1),
         pocket_sin=np.zeros(1),
         drive=_moved(bearing.drive, moved),
@@ -459,10 +459,6 @@ def one_roller(bearing: RollerBearing, size: int) -> OneRoller:
     return OneRoller(
         single, np.zeros(rows), np.zeros((2, rows)), np.zeros((2, POWERS)), np.zeros((2, LOADS)), scratch(1)
     )
-
-
-def _room_for_one(sizes: EqualRollers | UnequalRollers) -> EqualRollers | UnequalRollers:
-    return sizes if isinstance(sizes, EqualRollers) else UnequalRollers(np.zeros(VECTOR))
 
 
 def _moved(part: Any, by: int) -> Any:
