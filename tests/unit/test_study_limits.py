@@ -235,7 +235,7 @@ def test_tries_end_where_the_next_best_point_was_simulated(tmp_path, monkeypatch
     """Guide and pocket clearance, a limit that no simulation keeps: tries end before they are used up, at a point that the drawing
     does not distinguish from one that was simulated."""
     biased(monkeypatch.setattr, 5.0)
-    text = limited_study(tmp_path, "upper = 33.0", [("tries = 4", "tries = 20")]).read_text(encoding="utf-8")
+    text = limited_study(tmp_path, "upper = 31.0", [("tries = 4", "tries = 20")]).read_text(encoding="utf-8")
     first, second = (text.index("[[factor]]", place) for place in (0, text.index("[[factor]]") + 1))
     text = text[:first] + text[second : text.index("[[chain]]")].replace("radial_clearance_mm = 0.020\n", "")
     start, end = text.index("[design]"), text.index("[[response]]")
