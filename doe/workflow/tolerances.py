@@ -290,6 +290,7 @@ class PickParts(Record, eq=False):
     neighbours: Neighbourhood | None = None
     search_draws: Draws | None = None
     scene: Scene | None = None
+    limits: str = "all limits"
 
     def widest(self) -> PickTolerances | None:
         """The widest tolerances; None where no factor has a tolerance."""
@@ -414,7 +415,9 @@ class PickParts(Record, eq=False):
     def _promise(self, demands: Sequence[KeptGain]) -> str:
         """What parts keep, in words."""
         counted = any(demand.counts for demand in demands)
-        return " and ".join([*["keep the gains that count"] * counted, *["meet all limits"] * bool(self.goals.limited)])
+        return " and ".join(
+            [*["keep the gains that count"] * counted, *[f"meet {self.limits}"] * bool(self.goals.limited)]
+        )
 
     @property
     def _names(self) -> list[str]:

@@ -7,7 +7,7 @@ published table.
 import math
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from pathlib import Path
 
@@ -399,7 +399,7 @@ def run_study(
         clock.lap("confirmation_s")
         robustness = judge(study, pick, simulations) if robust else None
         clock.lap("robust_s", TOLERANCES)
-    tolerances = _tolerances(without_broken(study, confirmed["pick"]), searched, confirmed)
+    tolerances = _tolerances(study, searched, confirmed)
     chains, notes = solve_chains(study, pick, tolerances)
     clock.enter(ANSWER)
     reference = reference and reference.only([place for place in runs.places if place < len(reference.coded)])
@@ -462,12 +462,15 @@ def _tolerances(study: Problem, searched: Adaptive | None, confirmed: Mapping[st
     pick, settings = confirmed["pick"], study.file.tolerances
     if settings is None:
         return None
-    scene = study.confirmation_scene(pick.point)
-    if searched is None:
-        return PickParts(study, pick.point, settings, confirmed, scene=scene).widest()
-    neighbours = neighbourhood(study, searched, study.coded(pick.point)[None], pick.values[None])
-    draws = draws_about(study, searched, neighbours, pick, confirmed["baseline"])
-    return PickParts(study, pick.point, settings, confirmed, neighbours, draws, scene).widest()
+    scene, asked = study.confirmation_scene(pick.point), len(study.goals.limited)
+    study = without_broken(study, pick)
+    limits = "all limits" if len(study.goals.limited) == asked else "the limits that the selected design meets"
+    parts = PickParts(study, pick.point, settings, confirmed, scene=scene, limits=limits)
+    if searched is not None:
+        neighbours = neighbourhood(study, searched, study.coded(pick.point)[None], pick.values[None])
+        draws = draws_about(study, searched, neighbours, pick, confirmed["baseline"])
+        parts = replace(parts, neighbours=neighbours, search_draws=draws)
+    return parts.widest()
 
 
 def _compared(study: Problem, runs: Runs, reference: Runs) -> dict[str, PublishedComparison]:

@@ -121,6 +121,7 @@ def test_all_obstacles_are_named_at_once(tmp_path, monkeypatch):
         assert words in shown.stderr
     # Without the broken limits the gains and the kept limits still have tolerances.
     assert record["tolerances"] and "keeps impact_force_N <= 5" not in record["tolerances_sentence"]
+    assert "meet all limits" not in record["tolerances_sentence"]
 
 
 def test_a_limit_that_the_tolerances_break_is_an_obstacle_too(tmp_path, monkeypatch):
