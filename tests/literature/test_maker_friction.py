@@ -191,7 +191,7 @@ def test_unit_a_study_states_the_makers_friction():
         record = summary()
         for name, change in changes.items():
             record["confirmation"][name] |= change
-        return str(power(Summary.from_dict(record), {}).blocks)
+        return str(power(Summary.from_dict(record)).blocks)
 
     named, plain = stated(points), stated({"baseline": terms, "pick": terms})
     assert "over the 80 W of SKF's friction model: baseline 1.50, selected design 1.40." in named
