@@ -2,8 +2,8 @@
 
 ``python examples/benchmarks/parts.py STUDY.toml --out DIR`` takes the pick and the tolerances of a study that was finished in
 DIR (``doe study STUDY.toml --out DIR``), draws ``--parts`` parts with a fixed seed, simulates each with ``--replicates``
-replicates, and counts those that keep what the tolerances promise: the share ``keep`` of every gain that the surfaces predict
-for the pick, over the simulated baseline, and all limits. The interval of the count is Wilson's. Runs are kept in DIR.
+replicates, and counts those that keep what the tolerances promise: the least of every gain that counts, over the simulated
+baseline, and all limits. The interval of the count is Wilson's. Runs are kept in DIR.
 """
 
 import argparse
@@ -32,12 +32,10 @@ def main(path: Path, folder: Path, parts: int, replicates: int, workers: int | N
     half = np.array([tolerances[name]["half_width"] if name in tolerances else 0.0 for name in study.factors])
     pick = np.array([record["pick"][name] for name in study.factors])
     made = pick + half * random_offsets(parts, half.size, settings.distribution, SEEDS)
-    ends = record["front"]["baseline"]["responses"], record["pick_on_surfaces"]["responses"]
-    predicted = [goals.costs(np.array([each[name] for name in study.responses])) for each in ends]
-    gain = predicted[0] - predicted[1]
-    keep = np.where(gain > 0.0, settings.keep * gain, gain)
+    promised = [record["tolerances_gains"][study.responses[index]]["at_least_percent"] for index in goals.objectives]
     simulated = record["confirmation"]["baseline"]["responses"]
-    baseline = goals.costs(np.array([simulated[name]["value"] for name in study.responses]))
+    levels = np.array([simulated[name]["value"] for name in study.responses])
+    least = np.array([-np.inf if each is None else 0.01 * each for each in promised]) * abs(levels[goals.objectives])
     effort = [f"numerics.replicates={replicates}", "numerics.companion=false"]
     scenes = [study.scene_at(each, SEEDS + number, effort) for number, each in enumerate(made)]
     with Store(folder / "parts.sqlite", path.stem) as store:
@@ -45,7 +43,7 @@ def main(path: Path, folder: Path, parts: int, replicates: int, workers: int | N
         results = simulations.run(scenes, [f"part {number + 1}" for number in range(parts)], lambda done, total: None)
     sound = [result for result in results if not isinstance(result, Failure)]
     values = clearance.figures(study.responses, sound)[0]
-    margin = baseline - keep - goals.costs(values)
+    margin = goals.costs(levels) - least - goals.costs(values)
     kept = (margin >= 0.0) & (goals.violations(values, values) <= 0.0).all(axis=1, keepdims=True)
     share = next(iter(tolerances.values()))
     print(f"stated: {percent(share['probability'])} % ({Interval(*share['interval']).words}) of the parts")
@@ -53,8 +51,9 @@ def main(path: Path, folder: Path, parts: int, replicates: int, workers: int | N
     found = Interval(*wilson(count / len(sound), len(sound)))
     print(f"simulated: {count} of {len(sound)}, {percent(count / len(sound))} % ({found.words})")
     for column, index in enumerate(goals.objectives):
-        lost = int((margin[:, column] < 0.0).sum())
-        print(f"  {study.responses[index]}: {lost} below {100.0 * settings.keep:g} % of the gain")
+        if promised[column] is not None:
+            lost = int((margin[:, column] < 0.0).sum())
+            print(f"  {study.responses[index]}: {lost} below the least gain, {promised[column]:.3g} %")
 
 
 if __name__ == "__main__":
