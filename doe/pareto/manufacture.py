@@ -1,7 +1,8 @@
 """Responses of parts within tolerances about a point: their range, robust costs, shares of parts, and robust fronts.
 
 A part is somewhere in the tolerance box about its nominal point. The robust cost of a point is the worst in that box, or a
-quantile of the parts. Nominal points keep their whole box inside the region, so that no surface is extrapolated.
+quantile of the parts. Parts may lie beyond the region of the nominal points by their tolerance, as those about any selected
+design do.
 
 Responses are quadratics of coded factors, with a monotone ``link`` for a transformed response. Their range over a box is
 exact, and their values around a point are computed together.
@@ -288,8 +289,7 @@ class ToleranceAware(Record, eq=False):
 
     ``points`` (f, k) are coded, ``costs`` (f, q) robust, ``values`` (f, m) nominal responses, ``picks`` rows.
     ``baseline_costs`` (q,): robust costs of the baseline. ``nominal_loss_percent``: loss of hypervolume by the nominal values
-    compared with the plain front; ``robust_gain_percent``: gain of hypervolume by the robust costs. Unless ``plain_inside``,
-    the box of the plain pick exceeds the region and its figures extrapolate.
+    compared with the plain front; ``robust_gain_percent``: gain of hypervolume by the robust costs.
     """
 
     box: ToleranceBox
@@ -304,7 +304,6 @@ class ToleranceAware(Record, eq=False):
     nominal_loss_percent: float
     robust_gain_percent: float
     plain_pick_costs: Array
-    plain_inside: bool
     survival: Survival
 
 
@@ -330,27 +329,25 @@ def tolerance_aware_front(
 
     surfaces : of the m responses, in coded units.
     box : the tolerances.
-    lower, upper : bounds (k,) of the region in coded units, which contains the boxes of all points.
+    lower, upper : bounds (k,) of the nominal points in coded units.
     goals : of the responses.
     baseline : coded point (k,) to improve on. If robust costs of any point dominate its nominal costs, picks are among such
         points, else among those that dominate its robust costs.
     plain, plain_pick : coded points and costs of the plain front, and the row of its pick.
     population, generations, seed, keep, pick, doubt, barred : as for `doe.pareto.front`, of coded points.
 
-    Raises ValueError when a tolerance exceeds the region; InfeasibleError when no point keeps all limits.
+    Raises ValueError when a setting of the search is impossible; InfeasibleError when no point keeps all limits.
     """
-    low, high = lower + box.half, upper - box.half
-    check_search(low, high, population, generations, keep)
+    check_search(lower, upper, population, generations, keep)
     judge = partial(box.judge, surfaces, goals)
-    searched = search(barring(partial(judge, doubt=doubt), barred), low, high, population, generations, seed)
+    searched = search(barring(partial(judge, doubt=doubt), barred), lower, upper, population, generations, seed)
     points, costs = searched.archive
     nominal_baseline = goals.costs(_nominal(surfaces, baseline[None]))[0]
     baseline_costs = judge(baseline[None]).costs[0]
     survives_nominal = bool(dominates(costs, nominal_baseline).any())
     rows, picks, among = thinning(costs, goals, nominal_baseline if survives_nominal else baseline_costs, keep)
     values = _nominal(surfaces, points[rows])
-    inside = ((plain.points >= low - 1e-12) & (plain.points <= high + 1e-12)).all(axis=1)
-    robust_plain = judge(plain.points[inside]).costs if inside.any() else costs[:0]
+    robust_plain = judge(plain.points).costs
     spans, robust_spans = ((front.min(axis=0), front.max(axis=0)) for front in (plain.costs, costs))
     losing = hypervolume(goals.costs(values), *spans), hypervolume(plain.costs, *spans)
     gaining = hypervolume(costs[rows], *robust_spans), hypervolume(robust_plain, *robust_spans)
@@ -368,10 +365,10 @@ def tolerance_aware_front(
         pick_reason=f"{NAMES[pick]} {among}" + (" also at the ends of their tolerances" if survives_nominal else ""),
         baseline_costs=baseline_costs,
         hypervolume=hypervolume(costs, *robust_spans),
-        nominal_loss_percent=100.0 * (1.0 - losing[0] / losing[1]) if losing[1] > 0.0 else 0.0,
+        # No nominal point is better than the plain front but by what that search missed.
+        nominal_loss_percent=100.0 * max(1.0 - losing[0] / losing[1], 0.0) if losing[1] > 0.0 else 0.0,
         robust_gain_percent=100.0 * (gaining[0] / gaining[1] - 1.0) if gaining[1] > 0.0 else np.inf,
-        plain_pick_costs=judge(plain.points[[plain_pick]]).costs[0],
-        plain_inside=bool(np.take(inside, plain_pick)),
+        plain_pick_costs=robust_plain[plain_pick],
         survival=Survival(survives[0], survives[1], error, None, None, ""),
     )
 

@@ -136,13 +136,35 @@ def _uncertainty(study: Problem, pareto: ParetoFront) -> FrontUncertainty:
     return front_uncertainty(values[:, :-1], *pick, *baseline)
 
 
+def part_ends(study: Problem) -> Array:
+    """Ends (k, 2) of the parts in factor units: those of the region, and beyond by the tolerances where such a bearing is possible."""
+    ends, without_scene = study.ends.copy(), not _is_possible(study, study.baseline)
+    for place, name in enumerate(study.factors):
+        for side, sign in enumerate((-1.0, 1.0)):
+            point = study.baseline.copy()
+            point[place] = ends[place, side] + sign * study.known_tolerances.get(name, 0.0)
+            if without_scene or _is_possible(study, point):
+                ends[place, side] = point[place]
+    return ends
+
+
+def _is_possible(study: Problem, point: Array) -> bool:
+    """Whether there is a scene at a point (k,) in factor units."""
+    try:
+        study.scene_at(point, study.file.design.seed)
+    except InputError:
+        return False
+    return True
+
+
 def _tolerance_aware(study: Problem, pareto: ParetoFront, box: ToleranceBox, doubt: Doubt) -> ToleranceAware:
-    reach = study.reach
+    # Nominal points keep their tolerance away from a bound beyond which no bearing is possible.
+    low, high = study.coded(part_ends(study).T)
     return tolerance_aware_front(
         quadratics(study.surfaces, len(study.factors)),
         box,
-        -reach,
-        reach,
+        np.maximum(-study.reach, low + box.half),
+        np.minimum(study.reach, high - box.half),
         pareto.goals,
         baseline=study.coded(study.baseline),
         plain=Archive(study.coded(pareto.points), pareto.costs),

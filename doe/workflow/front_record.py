@@ -120,7 +120,6 @@ class ToleranceFront(Record, kw_only=True):
     picks: dict[str, RobustPoint]
     baseline_robust: dict[str, float]
     plain_pick_robust: dict[str, float]
-    plain_pick_inside: bool
     nominal_loss_percent: float
     robust_gain_percent: float | None
     pick_gains_percent: dict[str, float]
@@ -151,7 +150,6 @@ class ToleranceFront(Record, kw_only=True):
             picks={rule: front[row] for rule, row in aware.picks.items()},
             baseline_robust=robust(aware.baseline_costs),
             plain_pick_robust=robust(aware.plain_pick_costs),
-            plain_pick_inside=aware.plain_inside,
             nominal_loss_percent=aware.nominal_loss_percent,
             robust_gain_percent=finite(aware.robust_gain_percent),
             pick_gains_percent={gain.response: gain.percent for gain in predicted_gains(study, points[aware.pick])},

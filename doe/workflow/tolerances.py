@@ -19,7 +19,7 @@ from doe.pareto.search import Goals
 from doe.pareto.tolerance import RIM, Neighbourhood, Parts, WidestTolerances
 from doe.study_file.sections import Tolerances
 from doe.workflow.confirmation import Confirmed, gains
-from doe.workflow.front import Draws, draws_of, keeping, open_errors
+from doe.workflow.front import Draws, draws_of, keeping, open_errors, part_ends
 from doe.workflow.parts import Grade, PartWidth, grades_of
 from doe.workflow.problem import Problem
 from doe.workflow.surfaces import predict_all
@@ -394,8 +394,9 @@ class PickParts(Record, eq=False):
         no_violations = np.zeros((1, len(self.goals.limited)))
         half_widths = study.known_tolerances
         ratios = np.array([half_widths.get(name, np.nan) for name in study.factors])
-        extent, (low, high) = np.nan_to_num(ratios), study.ends.T
-        low, high = np.minimum(low, self.point - extent), np.maximum(high, self.point + extent)
+        extent, (low, high), possible = np.nan_to_num(ratios), study.ends.T, part_ends(study).T
+        low = np.minimum(low, np.maximum(self.point - extent, possible[0]))
+        high = np.maximum(high, np.minimum(self.point + extent, possible[1]))
         count = None if draws is None else keeping(study, draws, self.point, free, least - slack)
         parts = Parts(
             objectives=self._costs,

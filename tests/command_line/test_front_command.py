@@ -1,15 +1,16 @@
 """``doe front`` and the front of a study: what is asked in STUDY.toml, what is printed and what is refused."""
 
 import json
+import shutil
 
 import numpy as np
 import pytest
-from pareto_cases import TABLE, TOLERANCES, edited_study, table_surfaces
+from pareto_cases import EXAMPLES, TABLE, TOLERANCES, edited_study, table_surfaces
 from typer.testing import CliRunner
 
 from doe.cli import app
 from doe.study_file.sections import Tolerances
-from doe.workflow.front import find_front
+from doe.workflow.front import find_front, part_ends
 from doe.workflow.front_record import SurfaceFront
 from doe.workflow.tolerances import PickParts
 from rbdyn.base.faults import InputError
@@ -186,6 +187,23 @@ def test_missing_and_too_wide_tolerances_are_named(tmp_path):
     assert [fault.split(":")[1] for fault in refused.value.faults] == [" factor.tolerance of guide_clearance_mm"]
     with pytest.raises(InputError, match="leaves no space in the region"):
         front_of(tmp_path, TOLERANCES[0], (TOLERANCES[1][0], TOLERANCES[1][1].replace("0.01", "0.2")), asked)
+
+
+def test_no_part_lies_where_no_bearing_is_possible(tmp_path):
+    shutil.copy(EXAMPLES / "cylindrical_roller.toml", tmp_path)
+    wide = (TOLERANCES[1][0], TOLERANCES[1][1].replace("0.01", "0.08"))
+    study = edited_study(tmp_path, TOLERANCES[0], wide, ("[front]", '[front]\ntolerance_aware = "quantile"'))
+    (low, high), place = study.ends.T, study.factors.index("guide_clearance_mm")
+    width = np.array(list(study.known_tolerances.values()))
+    assert low[place] < width[place], "parts at the lower bound would have no clearance in the guide"
+    possible = np.where(np.arange(3) == place, low, low - width)
+    ends = part_ends(study).T
+    assert ends == pytest.approx(np.array([possible, high + width]))
+    study = study.with_surfaces(table_surfaces(study))
+    aware = find_front(study).tolerance_aware
+    assert study.actual(aware.points)[:, place].min() >= low[place] + width[place] - 1e-12
+    widest = PickParts(study, np.array([0.0136, low[place] + 0.001, 0.301]), Tolerances(gains=["impact_force_N"], keep=0.01)).widest()
+    assert widest.half_widths[place] <= 0.001 + 1e-12
 
 
 def test_widest_tolerances_of_a_study_keep_what_they_say(tmp_path):

@@ -189,7 +189,7 @@ def summary() -> dict[str, Any]:
             "tolerance_aware": {
                 "kind": "worst_case", "quantile": None, "distribution": "uniform", "half_widths": {},
                 "front": robust, "hypervolume": 0.8, "pick": {**robust[3], "reason": "the knee"}, "picks": {},
-                "baseline_robust": {}, "plain_pick_robust": {}, "plain_pick_inside": True, "nominal_loss_percent": 1.0,
+                "baseline_robust": {}, "plain_pick_robust": {}, "nominal_loss_percent": 1.0,
                 "robust_gain_percent": None, "pick_gains_percent": {},
                 "survival": {**dict.fromkeys(("plain_pick", "pick", "standard_error", "plain_pick_interval", "pick_interval")),
                              "open_errors": ""},

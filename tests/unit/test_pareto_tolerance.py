@@ -148,12 +148,30 @@ def test_wide_tolerances_cost_and_parts_fail():
     found = robust(ToleranceBox(np.full(2, 0.6), "quantile"))
     assert found.survival.plain_pick < 0.9
     assert found.survival.pick >= found.survival.plain_pick - 3 * found.survival.standard_error
-    assert (found.points + 0.6 <= 2.0 + 1e-12).all() and (found.points - 0.6 >= -2.0 - 1e-12).all()
+    assert (np.abs(found.points) <= 2.0).all()
 
 
-def test_tolerance_wider_than_the_region_is_refused():
-    with pytest.raises(ValueError, match="factor 1: lower bound"):
-        robust(ToleranceBox(np.full(2, 2.5)))
+def test_nominal_points_reach_the_bounds_of_the_region_and_parts_lie_beyond():
+    # Both costs fall with x: the front is at the bound, and the worst part is a tolerance short of it.
+    falling = [
+        Quadratic(0.0, np.array([-1.0, 0.0]), np.diag([0.0, 1.0])),
+        Quadratic(0.0, np.array([-2.0, 1.0]), np.diag([0.0, 1.0])),
+    ]
+    points = np.array([[1.0, 0.0], [0.9, 0.0]])
+    found = tolerance_aware_front(
+        falling,
+        ToleranceBox(np.full(2, 0.1)),
+        np.full(2, -1.0),
+        np.full(2, 1.0),
+        Goals.of(["min", "min"]),
+        baseline=np.zeros(2),
+        plain=Archive(points, np.column_stack([surface.predict(points) for surface in falling])),
+        plain_pick=0,
+        population=40,
+        generations=30,
+    )
+    assert found.points[:, 0] == pytest.approx(1.0, abs=1e-3)
+    assert found.plain_pick_costs == pytest.approx([-0.9 + 0.01, -1.8 + 0.11])
 
 
 def first_factor(points):

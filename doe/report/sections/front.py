@@ -270,10 +270,6 @@ def _with_tolerances(asked: Asked, aware: ToleranceFront | None) -> list[Block]:
         at_pick = share_with_interval(survival.pick, survival.pick_interval)
         sentences.append(f"Parts that still beat the baseline: {plain} ({WITHOUT}), {at_pick} (selected).")
     sentences.append(survival.open_errors)
-    if not aware.plain_pick_inside:
-        sentences.append(
-            f"The tolerances of the {WITHOUT} reach out of the design region: its results are extrapolated."
-        )
     table = Table(f"At the ends of the tolerances, {widths}: {kind}", ["point", *map(label, asked.names)], rows)
     return [table, *map(Paragraph, sentences)]
 
