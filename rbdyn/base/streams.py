@@ -7,6 +7,7 @@ of them acts on a terminal; what styles its text itself escapes first and writes
 
 import codecs
 import errno
+import gc
 import io
 import logging
 import os
@@ -29,6 +30,8 @@ PLAIN = {
 ACTING = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\u2028-\u202e\u2066-\u2069]|\r(?!\n)")
 # Time [s] after which a swallowed Ctrl-C is raised again.
 AGAIN_S = 0.05
+# New objects between two searches for garbage in cycles. At Python's 700 these take a twentieth of a study and find little.
+OBJECTS_A_COLLECTION = 50_000
 # A path in the text of a warning, and the longest text that is printed.
 PATH, LONGEST_WARNING = re.compile(r"(?<!\w)(?:[A-Za-z]:)?[/\\][^\s/\\]+[/\\]\S+"), 300
 
@@ -104,6 +107,7 @@ def run(app: Callable[[], object]) -> NoReturn:
     # Pictures go to files only, whatever the user's own programs show; typer styles no text, for it may quote an argument.
     os.environ |= {"MPLBACKEND": "agg", "_TYPER_FORCE_DISABLE_TERMINAL": "1"}
     logging.getLogger("matplotlib").setLevel(logging.ERROR)  # without a home it tells where its cache is
+    gc.set_threshold(OBJECTS_A_COLLECTION)
     out, interrupts = _replace_streams(), _pending_interrupts()
     _shorten_warnings()
     try:
