@@ -223,6 +223,7 @@ def front(
     searched, violations = _searched(judge, low, high, population, generations, seed, closest)
     points, costs = searched.archive
     ideal, nadir = costs.min(axis=0), costs.max(axis=0)
+    history = growth([found.costs for found in searched.generations], ideal, nadir)
     baseline_values = None if baseline is None else _values(objectives, np.atleast_2d(baseline))[0]
     baseline_costs = None if baseline_values is None else goals.costs(baseline_values)
     best = int(knee_depth(costs).argmax())
@@ -231,8 +232,8 @@ def front(
         points=points[rows],
         values=_values(objectives, points[rows]),
         costs=costs[rows],
-        hypervolume=hypervolume(costs, ideal, nadir),
-        hypervolume_history=growth([found.costs for found in searched.generations], ideal, nadir),
+        hypervolume=float(history[-1]),
+        hypervolume_history=history,
         ideal=ideal,
         nadir=nadir,
         knee=int(np.searchsorted(rows, best)),

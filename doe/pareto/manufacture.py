@@ -37,6 +37,7 @@ from doe.pareto.search import (
     Rule,
     barring,
     check_search,
+    columns_of,
     dominates,
     hypervolume,
     search,
@@ -266,7 +267,7 @@ class ToleranceBox(Record, eq=False):
     def parts(self, surfaces: Sequence[Quadratic], points: Array, samples: int | None = None) -> Array:
         """Responses (n, s, m) of parts at coded nominal points (n, k)."""
         offset = self.half * even_offsets(samples or self.samples, self.half.size, self.distribution)
-        return np.stack([surface.around(points, offset) for surface in surfaces], axis=-1)
+        return columns_of([surface.around(points, offset) for surface in surfaces])
 
 
 class Survival(Record):

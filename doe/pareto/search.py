@@ -20,6 +20,7 @@ from itertools import accumulate
 from typing import Any, Literal, NamedTuple, Self, get_args
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.stats import qmc
 
 from rbdyn.base.arrays import Array, Mask, Rows
@@ -62,17 +63,28 @@ def growth(generations: Sequence[Array], ideal: Array, nadir: Array) -> Array:
     if ideal.size <= EXACT:
         archives = accumulate(generations, _merged_costs, initial=generations[0][:0])
         return np.array([hypervolume(costs, ideal, nadir) for costs in archives][1:])
-    levels = REFERENCE * qmc.Sobol(ideal.size, seed=1).random_base2(LEVELS)
-    counts, total = list[int](), len(levels)
+    values = REFERENCE * qmc.Sobol(ideal.size, seed=1).random_base2(LEVELS).T
+    ordered = np.sort(values, axis=1)
+
+    def ranks(columns: Array) -> NDArray[np.int16]:
+        """Numbers of levels below each value of each column: short whole numbers compare four times as fast."""
+        return np.array([np.searchsorted(*pair) for pair in zip(ordered, columns, strict=True)], dtype=np.int16)
+
+    levels, counts = ranks(values), list[int]()
     for costs in generations:
-        new = normalised(costs, ideal, nadir)
-        for first in range(0, len(new), BLOCK):
-            below = np.ones((min(BLOCK, len(new) - first), len(levels)), dtype=bool)
-            for column, level in zip(new[first : first + BLOCK].T, levels.T, strict=True):
-                below &= column[:, None] <= level[None]
-            levels = levels[~below.any(axis=0)]
-        counts.append(total - len(levels))
-    return float(REFERENCE**ideal.size) * np.array(counts) / total
+        new = ranks(normalised(costs, ideal, nadir).T)
+        for first in range(0, len(costs), BLOCK):
+            below = np.logical_and.reduce(
+                [a[:, None] <= b for a, b in zip(new[:, first : first + BLOCK], levels, strict=True)]
+            )
+            levels = levels[:, ~below.any(axis=0)]
+        counts.append(values.shape[1] - levels.shape[1])
+    return float(REFERENCE**ideal.size) * np.array(counts) / values.shape[1]
+
+
+def columns_of(parts: Sequence[Array]) -> Array:
+    """Equal arrays (...) as columns (..., q), each of which stays in one piece of memory: a search reads column by column."""
+    return np.moveaxis(np.array(parts), 0, -1)
 
 
 def _merged_costs(archive: Array, new: Array) -> Array:
@@ -332,7 +344,7 @@ class Goals(Record, eq=False):
                 columns.append(np.maximum(np.abs(low[..., i] - self.target[i]), np.abs(high[..., i] - self.target[i])))
             else:
                 columns.append(high[..., i] if self.kinds[i] == "min" else -low[..., i])
-        return np.stack(columns, axis=-1)
+        return columns_of(columns)
 
     def slopes(self, values: Array) -> Array:
         """Change of each cost with its response, (..., q): +1 or -1."""

@@ -19,6 +19,7 @@ from scipy.stats import spearmanr
 from doe.designs.model import second_order
 from doe.pareto.front import contrast_error, draw_coefficients
 from doe.pareto.manufacture import Quadratic, identity
+from doe.pareto.search import columns_of
 from doe.response_surface import Surface, cross_validate, fit, model_matrix
 from doe.response_surface.adequacy import Diagnostics, correlation, draw_fields
 from doe.response_surface.least_squares import backward, forward, slope
@@ -329,7 +330,7 @@ def drawn_responses(
             own_errors = errors[..., j] if len(rows) == runs else errors[:, rows, j]
             values = posterior.draws(squares[..., j], own_errors, fields[..., j], noise[..., j])
             columns.append(link(values[:, : len(coded)]))
-        yield np.stack(columns, axis=-1)
+        yield columns_of(columns)
 
 
 def residual_correlation(surfaces: Sequence[Surface]) -> Array:
