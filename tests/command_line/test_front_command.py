@@ -202,7 +202,9 @@ def test_no_part_lies_where_no_bearing_is_possible(tmp_path):
     study = study.with_surfaces(table_surfaces(study))
     aware = find_front(study).tolerance_aware
     assert study.actual(aware.points)[:, place].min() >= low[place] + width[place] - 1e-12
-    widest = PickParts(study, np.array([0.0136, low[place] + 0.001, 0.301]), Tolerances(gains=["impact_force_N"], keep=0.01)).widest()
+    widest = PickParts(
+        study, np.array([0.0136, low[place] + 0.001, 0.301]), Tolerances(gains=["impact_force_N"], keep=0.01)
+    ).widest()
     assert widest.half_widths[place] <= 0.001 + 1e-12
 
 
