@@ -158,12 +158,12 @@ def simulated(steps: int = STEPS, turns: int = TURNS) -> tuple[pd.DataFrame, dic
         found = path.runout(FACE_RADIUS)
         record: dict[str, object] = {"case": case.number, "errors": case.title, "reading": case.reading}
         for name in ("indicator", "minimum_zone", "error_motion", "axial", "face", "asynchronous_radial"):
-            record[f"{name}_um"] = 1e6 * getattr(found, name)
+            record[f"{name}_um"] = getattr(found, f"{name}_um")
         record["theirs_um"] = case.theirs
         ours = float(record[case.measure])  # type: ignore[arg-type]
         record["ours_um"] = ours
         held = solved(case.errors, steps, turns, HELD).runout(FACE_RADIUS)
-        record["held_um"] = 1e6 * getattr(held, case.measure.removesuffix("_um"))
+        record["held_um"] = getattr(held, case.measure)
         for name, value in (("coefficient", ours), ("their_coefficient", case.theirs)):
             record[name] = math.nan if case.sum_um is None else homogenisation(value, case.sum_um, 0.0)
         records.append(record)
@@ -251,12 +251,12 @@ def design_table(found: dict[tuple[str, str], RaceLimits]) -> Table:
         check = limits.check
         agree = "" if check is None else f"{check.agreeing}/{check.bearings}"
         off = "" if check is None else f"{100 * check.radial_rms:.1f} %, {100 * check.face_rms:.1f} %"
-        heights = (limits.inner_roundness, limits.outer_roundness, limits.inner_sway, limits.outer_sway)
+        heights = limits.inner_roundness_um, limits.outer_roundness_um, limits.inner_sway_um, limits.outer_sway_um
         rows.append((
-            target, lot, *(f"{1e6 * height:.2f}" for height in heights),
+            target, lot, *(f"{height:.2f}" for height in heights),
             f"{with_error(100 * limits.yielded, 100 * limits.standard_error)} %",
             f"{100 * limits.proportional:.1f} %", off, agree,
-            *(f"{value:.2f}" for value in limits.homogenisation),
+            *(f"{value:.2f}" for value in (limits.radial_homogenisation, limits.axial_homogenisation)),
         ))  # fmt: skip
     header = ("target", "lot", "roundness in", "out", "side-sway in", "out", "yield", "in proportion",
               "differ by", "agree", "radial coeff.", "axial coeff.")  # fmt: skip

@@ -1,8 +1,8 @@
 """What ``rbdyn ball`` prints and writes: equilibria, sweeps over keys, runout, preload, clearance, wear, race limits."""
 
 import sys
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict, replace
+from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast, get_args
@@ -12,24 +12,28 @@ from rbdyn.base.command import Console, Delivery, checkpoint_message
 from rbdyn.base.faults import InputError, MethodError, axis_values
 from rbdyn.base.files import write_json
 from rbdyn.base.identity import identity_of
-from rbdyn.base.notes import status_notes
-from rbdyn.base.records import plain, save_table
+from rbdyn.base.notes import Notes, status_notes
+from rbdyn.base.records import Record, outside_json, save_table
 from rbdyn.base.words import counted, label, range_ends, shown, with_error
 from rbdyn.clearances import other_ranges
-from rbdyn.quasistatic.preload import Scan, over_clearance, over_preload, over_wear
+from rbdyn.quasistatic.preload import Point, Scan, over_clearance, over_preload, over_wear
 from rbdyn.quasistatic.result import (
-    RACES,
+    BallContact,
     BallResult,
     DoubleDeckerReport,
+    Remark,
+    RingLoad,
     RowReport,
+    Stiffness,
     ball_sheet,
     remarks,
     ring_figures,
     row_figures,
     tipping,
 )
-from rbdyn.quasistatic.runout.lots import Lot, bench_of, design, follow_ring, single_row
-from rbdyn.quasistatic.runout.turn import RingPath, ToleranceClass, running_accuracy
+from rbdyn.quasistatic.runout import lots
+from rbdyn.quasistatic.runout.lots import RaceLimits, single_row
+from rbdyn.quasistatic.runout.turn import Runout, ToleranceClass, running_accuracy
 from rbdyn.quasistatic.sweep import PointRecord, SweepResult, keys_of_texts, result_of, sweep
 from rbdyn.result import BallHeatBalance, start_sheet
 from rbdyn.scene import BallScene
@@ -133,19 +137,27 @@ SWEPT_FIGURES = {f"{race}_stress_MPa": f"{race}_pressure_MPa" for race in ("inne
 SOLVED = 100
 
 
-def runout_record(scene: BallScene) -> tuple[dict[str, Any], RingPath]:
-    """Runout of the turning ring over the form errors of its scene [um], and the path. Raises InputError, RunError."""
-    followed = follow_ring(scene)
-    runout = asdict(followed.runout(bench_of(scene).face_radius))
-    turns = runout.pop("turns")
-    return {**{f"{name}_um": 1e6 * value for name, value in runout.items()}, "turns": turns}, followed
+class Optimum(Record):
+    """Where a study is best, and its figures there."""
+
+    value: float
+    max_stress_MPa: float  # noqa: N815
+    L10_Mrev: float
 
 
-def optimum_study(scene: BallScene, swept: str, values: Sequence[float]) -> tuple[dict[str, Any], SweepResult]:
-    """Peak pressure and life over preload [N], clearance or wear of the balls [um], and where each is best; also as a sweep.
+class OptimumStudy(Record):
+    """Peak pressure and life over preload [N], clearance or wear of the balls [um], and where each is best; also as a sweep."""
 
-    Raises InputError for a double-decker, or for values that cannot be swept.
-    """
+    swept: str
+    points: list[dict[str, Any]]
+    least_stress: Optimum
+    longest_life: Optimum
+    notes: Notes
+    table: SweepResult = outside_json()
+
+
+def optimum_study(scene: BallScene, swept: str, values: Sequence[float]) -> OptimumStudy:
+    """Study of preload, clearance or wear. Raises InputError for a double-decker, or for values that cannot be swept."""
     run, unit, si = SWEPT[swept]
     try:
         scan = run(_single(scene, swept), [si * value for value in values])
@@ -154,36 +166,30 @@ def optimum_study(scene: BallScene, swept: str, values: Sequence[float]) -> tupl
     table = _table(scene, f"{swept}_{unit}", values, scan)
     names = {"value": f"{swept}_{unit}", **SWEPT_FIGURES, "status": "status"}
     points = [{name: point[column] for name, column in names.items() if column in point} for point in table.points()]
-    return {
-        "swept": f"{swept}_{unit}",
-        "points": points,
-        "least_stress": _best(scan, "least_stress", si),
-        "longest_life": _best(scan, "longest_life", si),
-        "notes": plain((*scan.notes, *table.placed_notes)),
-    }, table
+    notes = (*scan.notes, *table.placed_notes)
+    return OptimumStudy(
+        names["value"], points, _optimum(scan.least_stress, si), _optimum(scan.longest_life, si), notes, table
+    )
+
+
+def _optimum(point: Point, si: float) -> Optimum:
+    return Optimum(point.value / si, 1e-6 * point.peak_pressure, point.million_turns)
 
 
 def _table(scene: BallScene, key: str, values: Sequence[float], scan: Scan) -> SweepResult:
     """Figures, balls and notes of the points scanned."""
     points = []
     for point in scan.points:
-        solution, rating = point.solution, point.rating
-        record = PointRecord(solution.status, {}, {"row": solution.figures}, [], (), cold=False)
+        solution, rating, figures, found = point.solution, point.rating, dict[str, float](), list[Remark]()
         if solution.is_equilibrium:
-            ring = ring_figures(solution.displacement, solution.reaction, solution.stiffness)
-            figures = ring | row_figures(solution, rating)
+            stiffness, reaction = Stiffness(solution.stiffness.tolist()), RingLoad.of(solution.reaction)
+            figures = ring_figures(solution.displacement, reaction, stiffness) | row_figures(solution, rating)
             found = [*remarks(solution, rating), *tipping(solution.displacement, scene)]
-            record = record._replace(figures=figures, remarks=found)
-        points.append(record)
+        points.append(PointRecord(solution.status, figures, {"row": solution.figures}, found, (), cold=False))
     return result_of({key: tuple(values)}, points, 0.0, scene.model_dump(mode="json"))
 
 
-def _best(scan: Scan, which: str, si: float) -> dict[str, float]:
-    point = getattr(scan, which)
-    return {"value": point.value / si, "max_stress_MPa": 1e-6 * point.peak_pressure, "L10_Mrev": point.million_turns}
-
-
-def race_limits(scene: BallScene, tolerance_class: str, target_yield: float, seed: int = 1) -> dict[str, Any]:
+def race_limits(scene: BallScene, tolerance_class: str, target_yield: float, seed: int = 1) -> RaceLimits:
     """Limits of roundness and side-sway of both races with which the share ``target_yield`` of bearings meets a class.
 
     The lot has amplitudes that fall as 1/order from order 1 to 40 (``lots.Lot``). Raises InputError.
@@ -196,29 +202,13 @@ def race_limits(scene: BallScene, tolerance_class: str, target_yield: float, see
         raise InputError("bearing.bore_mm: missing; tolerance classes go by the bore, add it")
     try:
         allowed = running_accuracy(cast(ToleranceClass, tolerance_class), 1e-3 * row.bearing.bore_mm)
-        if allowed.axial is None:
+        if (axial := allowed.axial) is None:
             raise MethodError(f"class {tolerance_class} sets no limit on axial runout; choose P2, P4 or P5")
-        targets: dict[str, Any] = {
-            "radial_limit": allowed.radial,
-            "axial_limit": allowed.axial,
-            "target_yield": target_yield,
-        }
-        limits = design(bench_of(row), Lot(), **targets, seed=seed, solved=SOLVED)
+        goal: dict[str, Any] = {"target_yield": target_yield, "seed": seed, "solved": SOLVED}
+        limits = lots.design(lots.bench_of(row), lots.Lot(), radial_limit=allowed.radial, axial_limit=axial, **goal)
     except MethodError as error:
         raise InputError(f"--race-limits {tolerance_class}: {error}") from None
-    lengths = ("inner_roundness", "outer_roundness", "inner_sway", "outer_sway", "radial_limit", "axial_limit")
-    return {
-        "class": tolerance_class,
-        "wanted": target_yield,
-        **{f"{name}_um": 1e6 * getattr(limits, name) for name in lengths},
-        "yield": limits.yielded,
-        "standard_error": limits.standard_error,
-        "yield_in_proportion": limits.proportional,
-        "homogenisation": {"radial": limits.homogenisation[0], "axial": limits.homogenisation[1]},
-        "bearings": limits.bearings,
-        "solved_in_full": SOLVED,
-        "seed": limits.seed,
-    }
+    return replace(limits, tolerance_class=tolerance_class)
 
 
 def _single(scene: BallScene, option: str) -> SingleRowScene:
@@ -238,64 +228,54 @@ def run(
 ) -> Delivery:
     """Carry out the study ``name`` over ``value``. Raises InputError."""
     console.folder.claim(source)
-    table: SweepResult | None = None
+    study: RaceLimits | OptimumStudy
     if name == "race_limits":
-        record = race_limits(scene, value, target_yield, seed)
+        study, swept = race_limits(scene, value, target_yield, seed), {}
     else:
-        record, table = optimum_study(scene, name, axis_values(value, f"--{name}"))
-    command, swept = f"rbdyn ball --{name.replace('_', '-')}", table.keys if table else {}
+        study = optimum_study(scene, name, axis_values(value, f"--{name}"))
+        swept = study.table.keys
+    command = f"rbdyn ball --{name.replace('_', '-')}"
     identity = identity_of(command, scene.model_dump(mode="json"), [source], swept=swept)
-    answer, write = partial(blocks, record, table), partial(write_study, name, record, table)
-    return Delivery(identity, lambda: record, answer, write)
+    return Delivery(identity, study.as_dict, partial(blocks, study), partial(write_study, name, study))
 
 
-def write_study(name: str, record: dict[str, Any], table: SweepResult | None, folder: Path) -> list[str]:
+def write_study(name: str, study: RaceLimits | OptimumStudy, folder: Path) -> list[str]:
     """Write the record of a study, its points and their pictures, or the limits of race errors; returns the names of the files."""
-    write_json(folder / f"{name}.json", record)
-    if table is None:
-        return [f"{name}.json", limit_sheet(record).save(folder)]
+    write_json(folder / f"{name}.json", study.as_dict())
+    if isinstance(study, RaceLimits):
+        return [f"{name}.json", limit_sheet(study).save(folder)]
     from rbdyn.plots.ball import sweep_pictures
 
-    table.save(folder / f"{name}.csv")
-    return [f"{name}.json", f"{name}.csv", *sweep_pictures(table, folder)]
+    study.table.save(folder / f"{name}.csv")
+    return [f"{name}.json", f"{name}.csv", *sweep_pictures(study.table, folder)]
 
 
-def limit_sheet(record: Mapping[str, Any]) -> Sheet[Mapping[str, Any]]:
-    """A row a race: its largest roundness and side-sway [um]."""
-    columns: tuple[Column[Mapping[str, Any]], ...] = (
-        Column("race", meaning="inner or outer"),
-        Column(
-            "roundness_um", ".3g", "roundness up to [µm]", meaning="largest roundness and side-sway that meet the class"
-        ),
-        Column("sway_um", ".3g", "side-sway up to [µm]"),
-    )
-    rows = [
-        {"race": race, **{name: record.get(f"{race}_{name}") for name in ("roundness_um", "sway_um")}} for race in RACES
-    ]
-    content = "One row per raceway, of `rbdyn ball --race-limits`."
-    return Sheet("", columns, rows, file="race_limits.csv", content=content)
+def limit_sheet(limits: RaceLimits) -> Sheet[lots.RaceHeights]:
+    """A row a race: its largest roundness and side-sway."""
+    inner = lots.RaceHeights("inner", limits.inner_roundness_um, limits.inner_sway_um)
+    return lots.race_sheet(inner, lots.RaceHeights("outer", limits.outer_roundness_um, limits.outer_sway_um))
 
 
-def blocks(record: dict[str, Any], table: SweepResult | None) -> list[Block]:
+def blocks(study: RaceLimits | OptimumStudy) -> list[Block]:
     """The limits of race errors; or the points of a study, where they are best, and notes."""
-    if table is None:
-        return _limits(record)
+    if isinstance(study, RaceLimits):
+        return _limits(study)
     best = [
         Paragraph(
-            f"{title} at {point['value']:.4g}: {point['max_stress_MPa']:.0f} MPa, {shown(point['L10_Mrev'], 3)} million turns"
+            f"{title} at {point.value:.4g}: {point.max_stress_MPa:.0f} MPa, {shown(point.L10_Mrev, 3)} million turns"
         )
-        for title, point in (("least stress", record["least_stress"]), ("longest life", record["longest_life"]))
+        for title, point in (("least stress", study.least_stress), ("longest life", study.longest_life))
     ]
-    return with_notes(record["notes"], [points_table(table), *best])
+    return with_notes(study.notes, [points_table(study.table), *best])
 
 
-def _limits(record: dict[str, Any]) -> list[Block]:
-    title = f"class {record['class']}: {record['radial_limit_um']:g} µm radial, {record['axial_limit_um']:g} µm axial runout"
-    good = f"{with_error(100.0 * record['yield'], 100.0 * record['standard_error'])} % (standard error)"
-    solved = f"{record['solved_in_full']} of them solved in full, seed {record['seed']}"
+def _limits(limits: RaceLimits) -> list[Block]:
+    runouts = f"{limits.radial_limit_um:g} µm radial, {limits.axial_limit_um:g} µm axial runout"
+    good = f"{with_error(100.0 * limits.yielded, 100.0 * limits.standard_error)} % (standard error)"
+    solved = f"{limits.solved} of them solved in full, seed {limits.seed}"
     return [
-        replace(limit_sheet(record).block, caption=title),
-        Paragraph(f"yield {good} of {record['bearings']} bearings, {solved}"),
+        replace(limit_sheet(limits).block, caption=f"class {limits.tolerance_class}: {runouts}"),
+        Paragraph(f"yield {good} of {limits.bearings} bearings, {solved}"),
     ]
 
 
@@ -345,8 +325,8 @@ def with_runout(scene: BallScene, result: BallResult) -> "tuple[BallResult, pd.D
     """The result with the runout of its ring, and the path of that, where the scene has form errors."""
     if scene.errors is None or not result.is_equilibrium:
         return result, None
-    record, followed = runout_record(scene)
-    return replace(result, runout=record), followed.table()
+    ring = lots.follow_ring(scene)
+    return replace(result, runout=ring.runout(lots.bench_of(scene).face_radius)), ring.table()
 
 
 def write_equilibrium(result: BallResult, path: "pd.DataFrame | None", folder: Path) -> list[str]:
@@ -375,7 +355,7 @@ def _row_tables(title: str, row: RowReport) -> list[Block]:
     names = ("x", "y", "z", "tilt x", "tilt y")
     matrix = [
         (name, *(f"{value:.4g}" for value in values))
-        for name, values in zip(names, row.stiffness["matrix_SI"], strict=True)
+        for name, values in zip(names, row.stiffness.matrix_SI, strict=True)
     ]
     searches = "" if row.searches is None else f"{row.searches} searches, "
     spent = f"{searches}{row.iterations} Newton steps, {row.residual_N:.2g} N left over"
@@ -390,12 +370,11 @@ def _row_sentences(row: RowReport) -> list[str]:
     tilts = ", ".join(f"tilt {axis} {row.tilt_mrad[axis]:.4g} mrad" for axis in "xy")
     sentences = [f"ring (x along the radial load, z along the axis): {_place(row.displacement_mm)}, {tilts}"]
     for race, contact in row.contacts.items():
-        film = ""
-        if "central_film_um" in contact:
-            film = f", film {contact['central_film_um']:.3g} µm, lambda {contact['lambda_ratio']:.2g}"
-        axes = " x ".join(shown(1e3 * contact[f"semi_{axis}_mm"], 3) for axis in ("major", "minor"))
-        pressed = f"up to {contact['load_N']:.4g} N, {row.max_stress_MPa[race]:.0f} MPa"
-        sentences.append(f"{race} raceway: {pressed} on an ellipse of semi-axes {axes} µm{_edge(contact)}{film}")
+        film = contact.film
+        oil = "" if film is None else f", film {film.central_film_um:.3g} µm, lambda {film.lambda_ratio:.2g}"
+        axes = " x ".join(shown(1e3 * semi_axis, 3) for semi_axis in (contact.semi_major_mm, contact.semi_minor_mm))
+        pressed = f"up to {contact.load_N:.4g} N, {row.max_stress_MPa[race]:.0f} MPa"
+        sentences.append(f"{race} raceway: {pressed} on an ellipse of semi-axes {axes} µm{_edge(contact)}{oil}")
     life = row.life
     if life.L10_Mrev is not None:
         hours = f", {shown(life.L10_h, 3)} h" if life.L10_h is not None else ""
@@ -403,19 +382,19 @@ def _row_sentences(row: RowReport) -> list[str]:
     return [*sentences, f"stiffness: {_diagonal(row.stiffness)}"]
 
 
-def _edge(contact: dict[str, float]) -> str:
+def _edge(contact: BallContact) -> str:
     """How near the ellipse comes to the shoulder; empty without a contact."""
-    if "edge_angle_deg" not in contact:
+    if contact.edge_angle_deg is None:
         return ""
-    return f", its edge at {contact['edge_angle_deg']:.3g} deg (shoulder at {contact['shoulder_angle_deg']:.3g})"
+    return f", its edge at {contact.edge_angle_deg:.3g} deg (shoulder at {contact.shoulder_angle_deg:.3g})"
 
 
 def _place(place: dict[str, float]) -> str:
     return ", ".join(f"{axis} {1e3 * place[axis]:.4g} µm" for axis in "xyz")
 
 
-def _diagonal(stiffness: dict[str, Any]) -> str:
-    return ", ".join(f"{axis} {stiffness[f'{axis}_N_per_um']:.4g} N/µm" for axis in "xyz")
+def _diagonal(stiffness: Stiffness) -> str:
+    return ", ".join(f"{axis} {value:.4g} N/µm" for axis, value in stiffness.by_axis.items())
 
 
 def _middle_ring(report: DoubleDeckerReport) -> list[str]:
@@ -456,17 +435,17 @@ def _temperatures(nodes: dict[str, float], thermal: BallHeatBalance) -> list[str
 
 def _search_table(thermal: BallHeatBalance) -> Table:
     """Temperatures, heat and clearance of the states visited."""
-    header = (*(f"{part} [°C]" for part in NODE_NAMES.values()), "heat [W]", "clearance [µm]")
-    states = zip(thermal.path_C, thermal.path_heat_W, thermal.path_clearance_um, strict=True)
-    rows = [
-        [*(f"{state[node]:.1f}" for node in NODE_NAMES), f"{heat:.4g}", f"{clearance:.4g}"]
-        for state, heat, clearance in states
-    ]
-    return Table("search for steady temperatures", header, rows)
+    columns: tuple[Column[Any], ...] = (
+        *(Column(node, ".1f", f"{part} [°C]", at=(0, node)) for node, part in NODE_NAMES.items()),
+        Column("heat_W", ".4g", at=1),
+        Column("clearance_um", ".4g", at=2),
+    )
+    states = tuple(zip(thermal.path_C, thermal.path_heat_W, thermal.path_clearance_um, strict=True))
+    return Sheet("search for steady temperatures", columns, states).block
 
 
-def _runout(runout: dict[str, Any]) -> str:
-    radial = f"{runout['indicator_um']:.3g} µm by an indicator, {runout['minimum_zone_um']:.3g} µm between circles"
-    axial = f"axial {runout['axial_um']:.3g} µm, face {runout['face_um']:.3g} µm"
-    asynchronous = f"asynchronous {runout['asynchronous_radial_um']:.3g} µm"
-    return f"runout over {counted(runout['turns'], 'turn')}: radial {radial}, {axial}; {asynchronous}"
+def _runout(runout: Runout) -> str:
+    radial = f"{runout.indicator_um:.3g} µm by an indicator, {runout.minimum_zone_um:.3g} µm between circles"
+    axial = f"axial {runout.axial_um:.3g} µm, face {runout.face_um:.3g} µm"
+    asynchronous = f"asynchronous {runout.asynchronous_radial_um:.3g} µm"
+    return f"runout over {counted(runout.turns, 'turn')}: radial {radial}, {axial}; {asynchronous}"

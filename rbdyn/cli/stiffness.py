@@ -190,7 +190,7 @@ def _balls(scene: BallScene) -> tuple[Array, Any, Any]:
     """Stiffness [N/m] of balls in equilibrium, with the axial place and the tilt of the ring fixed. Raises MethodError without one."""
     from rbdyn.quasistatic.bearing import equilibrium
 
-    return np.array(equilibrium(scene, ranges=False).reached.stiffness["matrix_SI"])[:2, :2], None, None
+    return np.array(equilibrium(scene, ranges=False).reached.stiffness.matrix_SI)[:2, :2], None, None
 
 
 def over_speed(

@@ -12,11 +12,11 @@ from rbdyn.base.words import quantity
 from rbdyn.plots.style import BLUE, GREEN, GREY, INNER, ORANGE, OUTER, Axes, Line2D, plain, plt, save
 
 if TYPE_CHECKING:
-    from rbdyn.quasistatic.result import BallResult
+    from rbdyn.quasistatic.result import Ball, BallResult
     from rbdyn.quasistatic.sweep import SweepResult
 
 
-Balls = Sequence[Mapping[str, float]]
+Balls = Sequence["Ball"]
 # Extent of the grooves in the drawing to either side of the radial line [rad]; a scene has no shoulders.
 GROOVE = math.radians(62.0)
 RING_FILL = "#E4E4E4"
@@ -42,7 +42,7 @@ def pictures(result: "BallResult", folder: Path) -> list[str]:
 
 def column(balls: Balls, name: str) -> Array:
     """One figure of all balls."""
-    return np.array([ball[name] for ball in balls])
+    return np.array([getattr(ball, name) for ball in balls])
 
 
 def closed(values: Array) -> Array:
@@ -106,28 +106,30 @@ def section(rows: Mapping[str, Balls], bearing: Mapping[str, Any], path: Path) -
         for name, height in zip(RINGS[title], (-0.66, 0.64), strict=True):
             axis.text(-0.7, height, name, fontsize=8, color=GREY)
         head = f"{title}, ball" if title else "ball"
-        axis.set_title(f"{head} {place + 1} at {balls[place]['azimuth_deg']:.4g}°", fontsize=10)
+        axis.set_title(f"{head} {place + 1} at {balls[place].azimuth_deg:.4g}°", fontsize=10)
     save(figure, path)
 
 
-def _section_on(axis: Axes, ball: Mapping[str, float], drawing: Mapping[str, Any]) -> None:
+def _section_on(axis: Axes, ball: "Ball", drawing: Mapping[str, Any]) -> None:
     """One ball of diameter 1 about the origin: axial to the right, radial up."""
-    outer, inner = math.radians(ball["outer_angle_deg"]), math.radians(ball["inner_angle_deg"])
-    touching = ball["inner_load_N"] > 0.0
-    for race, angle, side in (("outer", outer, 1.0), ("inner", inner, -1.0)):
+    outer, inner = math.radians(ball.outer_angle_deg), math.radians(ball.inner_angle_deg)
+    for race, angle, load, side in (
+        ("outer", outer, ball.outer_load_N, 1.0),
+        ("inner", inner, ball.inner_load_N, -1.0),
+    ):
         factor = drawing[f"{race}_groove_factor"]
         # The groove's centre lies on the contact line, on the other side of the ball's centre.
         centre = -side * (factor - 0.5) * _along(angle)
         _groove(axis, centre, factor, side)
         colour = OUTER if race == "outer" else INNER
-        if race == "outer" or touching:
-            _contact(axis, ball, race, angle, side, colour)
+        if race == "outer" or load > 0.0:
+            _contact(axis, race, angle, load, side, colour)
         axis.plot(*centre, "+", color=colour, markersize=8, zorder=5)
     turn = np.linspace(0.0, 2.0 * math.pi, 200)
     axis.fill(0.5 * np.sin(turn), 0.5 * np.cos(turn), facecolor="white", edgecolor="black", linewidth=1.2, zorder=1)
     axis.plot([0.0, 0.0], [-0.72, 0.72], color=GREY, linewidth=0.8, linestyle=(0, (8, 3, 2, 3)), zorder=2)
     axis.annotate("", (0.0, 0.19), (0.0, 0.0), arrowprops={"arrowstyle": "->", "color": GREY}, zorder=4)
-    axis.text(-0.015, 0.2, f"{ball['centrifugal_force_N']:.3g} N\ncentrifugal", color=GREY, fontsize=8, ha="right")
+    axis.text(-0.015, 0.2, f"{ball.centrifugal_force_N:.3g} N\ncentrifugal", color=GREY, fontsize=8, ha="right")
     axis.set(xlim=(-0.78, 0.78), ylim=(-0.74, 0.74), aspect="equal")
     axis.set_axis_off()
 
@@ -148,7 +150,7 @@ def _groove(axis: Axes, centre: Array, radius: float, side: float) -> None:
     axis.plot(ring_x[:-2], ring_y[:-2], color="black", linewidth=1.0, zorder=2)
 
 
-def _contact(axis: Axes, ball: Mapping[str, float], race: str, angle: float, side: float, colour: str) -> None:
+def _contact(axis: Axes, race: str, angle: float, load: float, side: float, colour: str) -> None:
     """Contact line from the ball's centre to the race, its angle from the radial line, and the load."""
     reach = side * _along(angle)
     axis.plot([0.0, 0.62 * reach[0]], [0.0, 0.62 * reach[1]], color=colour, linewidth=1.4, zorder=3)
@@ -158,7 +160,7 @@ def _contact(axis: Axes, ball: Mapping[str, float], race: str, angle: float, sid
     axis.plot(side * arc * np.sin(turn), side * arc * np.cos(turn), color=colour, linewidth=0.9, zorder=3)
     # Next to the line, on the side away from the radial line.
     away, side_of = (1.0, "left") if reach[0] >= 0.0 else (-1.0, "right")
-    words = f"{ball[f'{race}_angle_deg']:.2f}°\n{ball[f'{race}_load_N']:.4g} N"
+    words = f"{math.degrees(angle):.2f}°\n{load:.4g} N"
     place = 0.66 * reach[0] + 0.02 * away, 0.63 * reach[1]
     axis.text(*place, words, color=colour, fontsize=9, ha=side_of, va="center", zorder=6)
 

@@ -27,14 +27,15 @@ from rbdyn.quasistatic.result import (
     Rating,
     RingLoad,
     RowReport,
-    ball_records,
+    RowState,
+    Stiffness,
+    balls_of,
     displacement_record,
-    film_record,
+    films_of,
     overload,
     reference_capacities,
     remarks,
     row_report,
-    stiffness_record,
     tipping,
 )
 from rbdyn.quasistatic.row.ball import Control, FixedShare, FrictionShare
@@ -98,8 +99,8 @@ def _single_row(scene: SingleRowScene, warm: Solution | None) -> BallResult:
     rating = Rating(scene.bearing, model, reference_capacities(scene.bearing), scene.operation.speeds)
     if why := overload(solution, rating):
         return replace(base, status=why)
-    film = film_record(scene, rating, solution, ("inner_ring", "outer_ring"))
-    report = row_report(rating, solution, film, RingLoad.of(solution.reaction))
+    films = films_of(scene, rating, solution, ("inner_ring", "outer_ring"))
+    report = row_report(rating, solution, films, RingLoad.of(solution.reaction))
     grown = growth_record(scene, {"inner_less_outer_race": row_change(scene)})
     notes = [*_limit_notes(scene, model), *(() if scene.lubricant is None else scene.lubricant.estimates)]
     notes += [remark.note for remark in (*remarks(solution, rating), *tipping(solution.displacement, scene))]
@@ -124,12 +125,12 @@ def _limit_notes(scene: SingleRowScene, model: RowModel) -> Notes:
     return (*clearance_notes(plays), *speed_notes(inner - outer, bearing.pitch_diameter, None, FASTEST[bearing.kind]))
 
 
-def _other_roots(scene: SingleRowScene, model: RowModel, solution: Solution) -> list[dict[str, Any]] | None:
+def _other_roots(scene: SingleRowScene, model: RowModel, solution: Solution) -> list[RowState] | None:
     """Other equilibria where the raceway control may have several; None without a search."""
     if scene.model.raceway_control not in SEVERAL_ROOTS or scene.model.solver != "convex":
         return None
     roots = other_roots(model.row, model.control, load_of(scene), constraint_of(scene), solution)
-    return [{**displacement_record(root.displacement), "balls": ball_records(root.figures)} for root in roots]
+    return [RowState(**displacement_record(root.displacement), balls=balls_of(root.figures)) for root in roots]
 
 
 def _solutions(start: Any, rows: int) -> tuple[Solution, ...]:
@@ -164,14 +165,14 @@ def _double_decker(scene: DoubleDeckerScene, starts: tuple[Solution, ...]) -> Ba
     for name, rating, row in zip(rings, ratings, rows, strict=True):
         if why := overload(row, rating):
             return replace(base, status=f"{name} row {why}")
-        layers[name] = row_report(rating, row, film_record(scene, rating, row, rings[name]), None)
+        layers[name] = row_report(rating, row, films_of(scene, rating, row, rings[name]), None)
         notes += [remark.note for remark in remarks(row, rating, name)]
     notes += [remark.note for remark in tipping(solution.displacement, scene)]
     races = zip(("inner_less_middle_bore", "middle_less_outer_race"), model.changes, strict=True)
     grown = growth_record(scene, dict(races))
     report = DoubleDeckerReport(
         **displacement_record(solution.displacement),
-        stiffness=stiffness_record(solution.stiffness),
+        stiffness=Stiffness(solution.stiffness.tolist()),
         reaction=RingLoad.of(solution.reaction),
         middle_ring=middle_ring(model, solution),
         residual_N=solution.residual,

@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Self
 import numpy as np
 
 from rbdyn.base.arrays import Array
-from rbdyn.base.blocks import Column, Sheet
+from rbdyn.base.blocks import Column, Sheet, columns_of, within
 from rbdyn.base.faults import MethodError
 from rbdyn.base.notes import Note, Notes
-from rbdyn.base.records import Record, outside_json, spread
+from rbdyn.base.records import Record, derived, outside_json, shown, spread, written
 from rbdyn.base.words import Brief, Figure, counted
 from rbdyn.contact import point_contact
 from rbdyn.contact.film_thickness import lambda_ratio
@@ -26,6 +26,7 @@ from rbdyn.properties.materials import equivalent_modulus
 from rbdyn.quasistatic.row.ball import FixedShare, FrictionShare
 from rbdyn.quasistatic.row.equilibrium import INNER_ANGLE, INNER_LOAD, MOMENT, OUTER_ANGLE, OUTER_LOAD, PULL, Solution
 from rbdyn.quasistatic.row.model import RowModel
+from rbdyn.quasistatic.runout.turn import Runout
 from rbdyn.result import BallHeatBalance, ColdSeizure, SavedRecord, StartResult
 from rbdyn.scene.ball import BallRow, BallScene
 from rbdyn.scene.fits import Fits, race_film_temperature
@@ -225,17 +226,79 @@ class RingLoad(Record):
         return cls(dict(zip("xyz", load[:3].tolist(), strict=True)), dict(zip("xy", load[3:].tolist(), strict=True)))
 
 
-class RowReport(RingPlace):
-    """Equilibrium of one row, units in the names: displacement of its inner ring, figures of each ball and of each race.
+class Ball(Record):
+    """Angles, loads and moment of one ball, units in the names."""
+
+    azimuth_deg: float = shown("azimuth [deg]", ".1f", meaning="place from x towards y")
+    inner_angle_deg: float = shown("inner angle [deg]", ".4g", meaning="contact angles, signed")
+    outer_angle_deg: float = shown("outer angle", ".4g")
+    inner_load_N: float = shown("inner load [N]", ".4g", meaning="contact loads")  # noqa: N815
+    outer_load_N: float = shown("outer load", ".4g")  # noqa: N815
+    centrifugal_force_N: float = shown("centrifugal [N]", ".4g", meaning="outwards")  # noqa: N815
+    gyroscopic_moment_Nmm: float = written("negative with the inner ring turning", unit="N mm")  # noqa: N815
+
+
+class Film(Record):
+    """Oil film of a contact at its load, the thermal factor included; ``lambda_ratio`` of the central film."""
+
+    central_film_um: float
+    minimum_film_um: float
+    lambda_ratio: float
+    film_stiffness_N_per_um: float  # noqa: N815
+
+
+class BallContact(Record, kw_only=True):
+    """Contact of the most loaded ball with a race: its ellipse, and its film if there is one.
+
+    ``edge_angle_deg``: largest angle at the edge of an ellipse of the row, None where no ball touches.
+    """
+
+    load_N: float  # noqa: N815
+    semi_major_mm: float
+    semi_minor_mm: float
+    area_mm2: float = derived(lambda self: math.pi * self.semi_major_mm * self.semi_minor_mm)
+    edge_angle_deg: float | None = None
+    shoulder_angle_deg: float
+    film: Film | None = spread(default=None)
+
+
+class Stiffness(Record):
+    """Stiffness of a ring: its diagonal, and all of it (5, 5) in SI."""
+
+    x_N_per_um: float = derived(lambda self: 1e-6 * self.matrix_SI[0][0])  # noqa: N815
+    y_N_per_um: float = derived(lambda self: 1e-6 * self.matrix_SI[1][1])  # noqa: N815
+    z_N_per_um: float = derived(lambda self: 1e-6 * self.matrix_SI[2][2])  # noqa: N815
+    tilt_x_Nm_per_mrad: float = derived(lambda self: 1e-3 * self.matrix_SI[3][3])  # noqa: N815
+    tilt_y_Nm_per_mrad: float = derived(lambda self: 1e-3 * self.matrix_SI[4][4])  # noqa: N815
+    matrix_SI: list[list[float]]  # noqa: N815
+
+    @property
+    def by_axis(self) -> dict[str, float]:
+        """Against displacements along the axes [N/um]."""
+        return {"x": self.x_N_per_um, "y": self.y_N_per_um, "z": self.z_N_per_um}
+
+    @property
+    def figures(self) -> dict[str, float]:
+        """Its diagonal, units in the names."""
+        return {f"stiffness_{key}": value for key, value in self.as_dict().items() if key != "matrix_SI"}
+
+
+class RowState(RingPlace):
+    """Equilibrium of one row: displacement of its inner ring, and its balls."""
+
+    balls: list[Ball]
+
+
+class RowReport(RowState):
+    """Equilibrium of one row with figures of each race, units in the names.
 
     ``life``: None without a load; its hours also None where nothing turns. ``searches``: starting values that the finite
     search tried. ``reaction``: load that the ring takes, of a single-row bearing only.
     """
 
-    balls: list[dict[str, float]]
     max_stress_MPa: dict[str, float]  # noqa: N815
-    contacts: dict[str, dict[str, float]]
-    stiffness: dict[str, Any]
+    contacts: dict[str, BallContact]
+    stiffness: Stiffness
     life: LifeFigures
     needed_friction: float
     residual_N: float  # noqa: N815
@@ -246,15 +309,16 @@ class RowReport(RingPlace):
     @property
     def figures(self) -> dict[str, float | None]:
         """Pressures, life, films, and the extremes of the balls' loads and angles, units in the names."""
-        loaded = [ball for ball in self.balls if ball["inner_load_N"] > NO_LOAD]
-        angles = [ball["inner_angle_deg"] for ball in loaded]
+        loaded = [ball for ball in self.balls if ball.inner_load_N > NO_LOAD]
+        angles = [ball.inner_angle_deg for ball in loaded]
         figures: dict[str, float | None] = {f"{race}_pressure_MPa": p for race, p in self.max_stress_MPa.items()}
         figures["life_Mrev" if self.life.L10_h is None else "life_h"] = self.life.L10_h or self.life.L10_Mrev
         for race, contact in self.contacts.items():
-            figures |= {
-                f"{race}_{key}": contact.get(key)
-                for key in ("load_N", "central_film_um", "lambda_ratio", "edge_angle_deg")
-            }
+            figures[f"{race}_load_N"] = contact.load_N
+            if contact.film is not None:
+                figures[f"{race}_central_film_um"] = contact.film.central_film_um
+                figures[f"{race}_lambda_ratio"] = contact.film.lambda_ratio
+            figures[f"{race}_edge_angle_deg"] = contact.edge_angle_deg
         if angles:
             figures |= {"inner_angle_min_deg": min(angles), "inner_angle_max_deg": max(angles)}
         return figures | {"loaded_balls": float(len(loaded)), "needed_friction": self.needed_friction}
@@ -273,7 +337,7 @@ class MiddleRing(RingPlace):
 class DoubleDeckerReport(RingPlace):
     """Equilibrium of a double-decker bearing: its inner ring, its middle ring and both rows."""
 
-    stiffness: dict[str, Any]
+    stiffness: Stiffness
     reaction: RingLoad
     middle_ring: MiddleRing
     residual_N: float  # noqa: N815
@@ -302,12 +366,12 @@ class BallResult(Brief, SavedRecord, kw_only=True):
     report: RowReport | DoubleDeckerReport | None = spread(default=None)
     ring_growth_um: dict[str, float] | None = None
     fits: Fits | None = None
-    other_roots: list[dict[str, Any]] | None = None
+    other_roots: list[RowState] | None = None
     notes: Notes | None = None
     cost: dict[str, float]
     versions: dict[str, str]
     scene: dict[str, Any]
-    runout: dict[str, float] | None = None
+    runout: Runout | None = None
     temperatures_C: dict[str, float] | None = None  # noqa: N815
     thermal: BallHeatBalance | ColdSeizure | None = None
     start: StartResult | None = None
@@ -341,9 +405,7 @@ class BallResult(Brief, SavedRecord, kw_only=True):
     @property
     def displacement(self) -> Array:
         """(x, y, z [m], theta_x, theta_y [rad]) of the inner ring. Raises MethodError where there is no equilibrium."""
-        report = self.reached
-        place, tilt = report.displacement_mm, report.tilt_mrad
-        return 1e-3 * np.array([place["x"], place["y"], place["z"], tilt["x"], tilt["y"]])
+        return 1e-3 * np.array([*self.reached.displacement_mm.values(), *self.reached.tilt_mrad.values()])
 
     @property
     def reached(self) -> RowReport | DoubleDeckerReport:
@@ -368,7 +430,7 @@ class BallResult(Brief, SavedRecord, kw_only=True):
             figures |= {f"{name}_row_{key}" if name else key: value for key, value in row.figures.items()}
         figures |= {f"displacement_{axis}_um": 1e3 * report.displacement_mm[axis] for axis in "xyz"}
         figures |= {f"tilt_{axis}_mrad": report.tilt_mrad[axis] for axis in "xy"}
-        figures |= {f"stiffness_{key}": value for key, value in report.stiffness.items() if key != "matrix_SI"}
+        figures |= report.stiffness.figures
         if isinstance(report, DoubleDeckerReport):
             figures["middle_ring_speed_rpm"] = report.middle_ring.speed_rpm
         if self.fits is not None:
@@ -390,9 +452,9 @@ class BallResult(Brief, SavedRecord, kw_only=True):
             stress = row.max_stress_MPa.items()
             figures += [Figure(f"{of_row}pressure, {race} raceway", p, None, "MPa") for race, p in stress]
             figures.append(Figure(f"{of_row}life L10", row.life.L10_Mrev, None, "million turns"))
-        for axis in "xyz" if self.report else "":
+        for axis, stiffness in self.report.stiffness.by_axis.items() if self.report else ():
             figures.append(Figure(f"displacement {axis}", 1e3 * self.reached.displacement_mm[axis], None, "µm"))
-            figures.append(Figure(f"stiffness {axis}", self.reached.stiffness[f"{axis}_N_per_um"], None, "N/µm"))
+            figures.append(Figure(f"stiffness {axis}", stiffness, None, "N/µm"))
         return f"{self.status}, {counted(len(self.notes or ()), 'note')}", figures
 
     def table(self) -> "pd.DataFrame":
@@ -400,25 +462,17 @@ class BallResult(Brief, SavedRecord, kw_only=True):
         return ball_sheet(self.row_reports).frame
 
 
-BALL_COLUMNS: tuple[Column[Mapping[str, Any]], ...] = (
-    Column("azimuth_deg", ".1f", "azimuth [deg]", meaning="place from x towards y"),
-    Column("inner_angle_deg", ".4g", "inner angle [deg]", meaning="contact angles, signed"),
-    Column("outer_angle_deg", ".4g", "outer angle"),
-    Column("inner_load_N", ".4g", "inner load [N]", meaning="contact loads"),
-    Column("outer_load_N", ".4g", "outer load"),
-    Column("centrifugal_force_N", ".4g", "centrifugal [N]", meaning="outwards"),
-    Column("gyroscopic_moment_Nmm", screen=False, unit="N mm", meaning="negative with the inner ring turning"),
-)
-ROW_AND_BALL: tuple[Column[Mapping[str, Any]], ...] = (
-    Column("row", meaning="of a double-decker: which row, and the ball in it"),
-    Column("ball"),
+BALL_COLUMNS: tuple[Column[tuple[str, int, Ball]], ...] = (
+    Column("row", at=0, meaning="of a double-decker: which row, and the ball in it"),
+    Column("ball", at=1),
+    *within(2, columns_of(Ball)),
 )
 
 
-def ball_sheet(rows: Mapping[str, RowReport]) -> Sheet[Mapping[str, Any]]:
+def ball_sheet(rows: Mapping[str, RowReport]) -> Sheet[tuple[str, int, Ball]]:
     """A row a ball of the rows by name; a single row has no name."""
-    balls = [{"row": name, "ball": place, **ball} for name, row in rows.items() for place, ball in enumerate(row.balls)]
-    columns = BALL_COLUMNS if "" in rows else (*ROW_AND_BALL, *BALL_COLUMNS)
+    balls = [(name, place, ball) for name, row in rows.items() for place, ball in enumerate(row.balls)]
+    columns = BALL_COLUMNS[2:] if "" in rows else BALL_COLUMNS
     return Sheet("", columns, balls, file="balls.csv", content="One row per ball of `rbdyn ball`.")
 
 
@@ -442,38 +496,21 @@ def ball_columns(figures: Array) -> dict[str, Array]:
     }
 
 
-def ball_records(figures: Array) -> list[dict[str, float]]:
-    """One record a ball, from the figures (Z, FIGURES) of ``solve_row``."""
-    columns = ball_columns(figures)
-    return [{name: float(values[j]) for name, values in columns.items()} for j in range(len(figures))]
+def balls_of(figures: Array) -> list[Ball]:
+    """The balls, from the figures (Z, FIGURES) of ``solve_row``."""
+    columns = [values.tolist() for values in ball_columns(figures).values()]
+    return [Ball(*values) for values in zip(*columns, strict=True)]
 
 
-def stiffness_record(stiffness: Array) -> dict[str, Any]:
-    """Diagonal stiffnesses and the whole matrix."""
-    across, tilt = (np.diag(stiffness)[:3] * 1e-6).tolist(), (np.diag(stiffness)[3:] * 1e-3).tolist()
-    return {
-        **{f"{axis}_N_per_um": value for axis, value in zip("xyz", across, strict=True)},
-        **{f"tilt_{axis}_Nm_per_mrad": value for axis, value in zip("xy", tilt, strict=True)},
-        "matrix_SI": stiffness.tolist(),
-    }
-
-
-def row_report(rating: Rating, solution: Solution, film: dict[str, Any], reaction: RingLoad | None) -> RowReport:
-    """Report of one row; ``film``: as ``film_record`` gives it."""
+def row_report(rating: Rating, solution: Solution, films: Mapping[Race, Film], reaction: RingLoad | None) -> RowReport:
+    """Report of one row; ``films``: of ``films_of``."""
     life = solution_life(solution, rating.capacities, turning_rings(*rating.speeds))
     return RowReport(
         **displacement_record(solution.displacement),
-        balls=ball_records(solution.figures),
+        balls=balls_of(solution.figures),
         max_stress_MPa={race: 1e-6 * pressure for race, pressure in pressures(solution, rating).items()},
-        contacts={
-            race: {
-                **contact_record(rating.contact(race), float(loads_on(solution, race).max())),
-                **_shoulder_record(rating, solution, race),
-                **film.get(race, {}),
-            }
-            for race in RACES
-        },
-        stiffness=stiffness_record(solution.stiffness),
+        contacts={race: _contact(rating, solution, race, films.get(race)) for race in RACES},
+        stiffness=Stiffness(solution.stiffness.tolist()),
         life=life.figures(*rating.speeds),
         needed_friction=needed_friction(solution, rating),
         residual_N=solution.residual,
@@ -483,69 +520,56 @@ def row_report(rating: Rating, solution: Solution, film: dict[str, Any], reactio
     )
 
 
-def contact_record(contact: PointContact, load: float) -> dict[str, float]:
-    """Ellipse of a contact under a load [N]."""
-    grown = load ** (1.0 / 3.0)
-    semi_major, semi_minor = 1e3 * contact.semi_major * grown, 1e3 * contact.semi_minor * grown
-    return {
-        "load_N": load,
-        "semi_major_mm": semi_major,
-        "semi_minor_mm": semi_minor,
-        "area_mm2": math.pi * semi_major * semi_minor,
-    }
+def _contact(rating: Rating, solution: Solution, race: Race, film: Film | None) -> BallContact:
+    load, edge = float(loads_on(solution, race).max()), float(edge_angles(solution, rating, race).max())
+    contact, grown = rating.contact(race), load ** (1.0 / 3.0)
+    return BallContact(
+        load_N=load,
+        semi_major_mm=1e3 * contact.semi_major * grown,
+        semi_minor_mm=1e3 * contact.semi_minor * grown,
+        edge_angle_deg=math.degrees(edge) if math.isfinite(edge) else None,
+        shoulder_angle_deg=math.degrees(rating.drawing.shoulder_angle(race)),
+        film=film,
+    )
 
 
-def _shoulder_record(rating: Rating, solution: Solution, race: Race) -> dict[str, float]:
-    """Largest angle at the edge of a contact ellipse, if any ball touches, and that of the shoulder [deg]."""
-    edge = float(edge_angles(solution, rating, race).max())
-    reached = {"edge_angle_deg": math.degrees(edge)} if math.isfinite(edge) else {}
-    return {**reached, "shoulder_angle_deg": math.degrees(rating.drawing.shoulder_angle(race))}
+def films_of(scene: BallScene, rating: Rating, solution: Solution, rings: tuple[str, str]) -> dict[Race, Film]:
+    """Film of each race at its largest load; ``rings``: names of the inner and the outer ring.
 
-
-def film_record(scene: BallScene, rating: Rating, solution: Solution, rings: tuple[str, str]) -> dict[str, Any]:
-    """Film of each race at its largest load, the thermal factor included; ``rings``: names of the inner and the outer ring.
-
-    Empty for a scene without oil, and for races without load or rolling speed.
+    Empty for a scene without oil, and without races that have no load or no rolling speed.
     """
     if scene.lubricant is None:
         return {}
-    lubricant, drawing, model = scene.lubricant, rating.drawing, rating.model
-    ball, inner, outer = (scene.material(part) for part in ("ball", *rings))
-    gamma = drawing.gamma
-    entrainment = point_contact.entrainment_speed(drawing.pitch_diameter, gamma, *rating.speeds)
-    films = {}
-    for race, contact, ring, side, loads in (
-        ("inner", model.inner_contact, inner, gamma, solution.inner_load),
-        ("outer", model.outer_contact, outer, -gamma, solution.outer_load),
-    ):
-        load = float(loads.max())
+    lubricant, drawing = scene.lubricant, rating.drawing
+    roughness = lubricant.roller_roughness, lubricant.race_roughness
+    entrainment = point_contact.entrainment_speed(drawing.pitch_diameter, drawing.gamma, *rating.speeds)
+    films = dict[Race, Film]()
+    for race, ring, side in zip(RACES, rings, (drawing.gamma, -drawing.gamma), strict=True):
+        load = float(loads_on(solution, race).max())
         if entrainment == 0.0 or load == 0.0:
             continue
         oil = lubricant.at(race_film_temperature(scene, race))
         radius = point_contact.rolling_radius(drawing.ball_diameter, side)
-        rolling = point_contact.RollingBall(contact, radius, equivalent_modulus(ball, ring), entrainment)
+        modulus = equivalent_modulus(scene.material("ball"), scene.material(ring))
+        rolling = point_contact.RollingBall(rating.contact(race), radius, modulus, entrainment)
         heat = float(point_contact.thermal_factor(rolling, oil, load))
         central = float(point_contact.central_film(rolling, oil, load)) * heat
-        roughness = lubricant.roller_roughness, lubricant.race_roughness
-        films[race] = {
-            "central_film_um": 1e6 * central,
-            "minimum_film_um": 1e6 * float(point_contact.minimum_film(rolling, oil, load)) * heat,
-            "lambda_ratio": float(lambda_ratio(central, *roughness)),
-            "film_stiffness_N_per_um": 1e-6 * float(point_contact.film_stiffness(rolling, oil, load)),
-        }
+        films[race] = Film(
+            central_film_um=1e6 * central,
+            minimum_film_um=1e6 * float(point_contact.minimum_film(rolling, oil, load)) * heat,
+            lambda_ratio=float(lambda_ratio(central, *roughness)),
+            film_stiffness_N_per_um=1e-6 * float(point_contact.film_stiffness(rolling, oil, load)),
+        )
     return films
 
 
-def ring_figures(displacement: Array, reaction: Array, stiffness: Array) -> dict[str, float]:
-    """Displacement, reaction and diagonal stiffnesses of a ring, from arrays (5,), (5,), (5, 5) in SI."""
+def ring_figures(displacement: Array, reaction: RingLoad, stiffness: Stiffness) -> dict[str, float]:
+    """Displacement, reaction and stiffnesses of a ring, from a ``displacement`` (5,) in SI."""
     figures = {f"{axis}_mm": 1e3 * displacement[i] for i, axis in enumerate("xyz")}
     figures |= {f"tilt_{axis}_mrad": 1e3 * displacement[3 + i] for i, axis in enumerate("xy")}
-    figures |= {f"force_{axis}_N": reaction[i] for i, axis in enumerate("xyz")}
-    figures |= {f"moment_{axis}_Nm": reaction[3 + i] for i, axis in enumerate("xy")}
-    figures |= {f"stiffness_{axis}_N_per_um": 1e-6 * stiffness[i, i] for i, axis in enumerate("xyz")}
-    return figures | {
-        f"stiffness_tilt_{axis}_Nm_per_mrad": 1e-3 * stiffness[3 + i, 3 + i] for i, axis in enumerate("xy")
-    }
+    figures |= {f"force_{axis}_N": force for axis, force in reaction.load_N.items()}
+    figures |= {f"moment_{axis}_Nm": moment for axis, moment in reaction.moment_Nm.items()}
+    return figures | stiffness.figures
 
 
 def row_figures(solution: Solution, rating: Rating) -> dict[str, float]:

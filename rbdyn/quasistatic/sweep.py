@@ -29,10 +29,11 @@ from rbdyn.base.records import derived, finite, keyed, outside_json, save_table
 from rbdyn.base.words import counted
 from rbdyn.quasistatic.bearing import equilibrium
 from rbdyn.quasistatic.result import (
+    Ball,
     DoubleDeckerReport,
     Remark,
     ball_columns,
-    ball_records,
+    balls_of,
     remarks,
     ring_figures,
     row_figures,
@@ -203,9 +204,9 @@ class SweepResult(SavedRecord, kw_only=True):
                 parts.append(columns | {"ball": np.arange(1, len(solved) + 1)} | ball_columns(solved))
         return pd.DataFrame({key: np.concatenate([part[key] for part in parts]) for key in parts[0]})
 
-    def balls_at(self, place: int) -> dict[str, list[dict[str, float]]]:
-        """Records of the balls of a point by row, as in ``BallResult``. Raises RuntimeError as ``balls``."""
-        return {name: ball_records(points[place]) for name, points in self._balls().items()}
+    def balls_at(self, place: int) -> dict[str, list[Ball]]:
+        """The balls of a point by row, as in ``BallResult``. Raises RuntimeError as ``balls``."""
+        return {name: balls_of(points[place]) for name, points in self._balls().items()}
 
     def _balls(self) -> dict[str, list[Array]]:
         if not self.figures:
@@ -350,8 +351,7 @@ def _solve(scene: BallScene, before: tuple[Solution, ...]) -> PointRecord:
         return PointRecord(result.status, {}, nothing, [], (), not started)
     report = result.reached
     assert report.reaction is not None
-    reaction = np.array([*report.reaction.load_N.values(), *report.reaction.moment_Nm.values()])
-    figures = ring_figures(result.displacement, reaction, np.array(report.stiffness["matrix_SI"]))
+    figures = ring_figures(result.displacement, report.reaction, report.stiffness)
     found = tipping(result.displacement, scene)
     for name, rating, solution in zip(rows, result.ratings, result.rows, strict=True):
         found += remarks(solution, rating, name.removeprefix("row"))

@@ -13,8 +13,9 @@ from typer.testing import CliRunner
 
 from rbdyn.base.faults import InputError
 from rbdyn.cli.app import app
-from rbdyn.cli.ball_studies import optimum_study, race_limits, runout_record
+from rbdyn.cli.ball_studies import optimum_study, race_limits, with_runout
 from rbdyn.quasistatic.bearing import equilibrium
+from rbdyn.quasistatic.runout.lots import follow_ring
 from rbdyn.quasistatic.sweep import keys_of_texts, sweep
 from rbdyn.scene import Scene
 
@@ -25,20 +26,20 @@ QUIET = EXAMPLES / "angular_contact_7014.toml"
 
 def test_unit_preload_study_finds_both_optima():
     """Unit: the least stress and the longest life are no worse than any point of the scan."""
-    record, _ = optimum_study(Scene.load(SINGLE), "preload", [0.0, 50.0, 100.0, 200.0])
-    stresses = [max(point["inner_stress_MPa"], point["outer_stress_MPa"]) for point in record["points"]]
-    assert record["least_stress"]["max_stress_MPa"] <= min(stresses)
-    assert record["longest_life"]["L10_Mrev"] >= max(point["L10_Mrev"] for point in record["points"])
-    assert 10.0 < record["least_stress"]["value"] < 100.0
+    study = optimum_study(Scene.load(SINGLE), "preload", [0.0, 50.0, 100.0, 200.0])
+    stresses = [max(point["inner_stress_MPa"], point["outer_stress_MPa"]) for point in study.points]
+    assert study.least_stress.max_stress_MPa <= min(stresses)
+    assert study.longest_life.L10_Mrev >= max(point["L10_Mrev"] for point in study.points)
+    assert 10.0 < study.least_stress.value < 100.0
 
 
 def test_unit_runout_of_a_scene_follows_its_errors():
     """Unit: waviness of order Z + 1 on the turning race reaches the ring whole; an indicator reads twice its amplitude."""
     wavy = Scene.load(QUIET, ["errors.inner_roundness=[{order=19, amplitude_um=0.2}]"])
-    record, path = runout_record(wavy)
-    assert record["indicator_um"] == pytest.approx(0.4, rel=1e-3)
-    assert record["axial_um"] < 1e-6
-    assert len(path.table()) == wavy.errors.steps * wavy.errors.turns
+    result, path = with_runout(wavy, equilibrium(wavy))
+    assert result.runout.indicator_um == pytest.approx(0.4, rel=1e-3)
+    assert result.runout.axial_um < 1e-6
+    assert len(path) == wavy.errors.steps * wavy.errors.turns
 
 
 @pytest.mark.parametrize(
@@ -47,7 +48,7 @@ def test_unit_runout_of_a_scene_follows_its_errors():
         (lambda scene: race_limits(scene, "P3", 0.95), [], "--race-limits P3: is not a tolerance class; choose one of P2"),
         (lambda scene: race_limits(scene, "P2", 0.95), [], "bearing.bore_mm: missing"),
         (lambda scene: race_limits(scene, "P6", 0.95), ["bearing.bore_mm=35.0"], "sets no limit on axial runout"),
-        (lambda scene: runout_record(scene), [], "errors: missing"),
+        (follow_ring, [], "errors: missing"),
         (
             lambda scene: optimum_study(scene, "preload", [0.0, 1.0, 2.0]),
             ["operation.axial_load_N=0.0", "operation.preload_um=3.0"],

@@ -94,23 +94,23 @@ def test_invariant_first_order_passes_wholly(bench):
     assert y == pytest.approx(-size * np.sin(found.ring_angle + phase), abs=1e-5 * size)
     assert np.ptp(z) < 1e-5 * size and FACE * np.abs((theta_x, theta_y)).max() < 1e-4 * size
     measures = found.runout(FACE)
-    assert measures.indicator == pytest.approx(2.0 * size, rel=1e-4)
-    assert measures.minimum_zone < 1e-4 * size
+    assert measures.indicator_um == pytest.approx(2e6 * size, rel=1e-4)
+    assert measures.minimum_zone_um < 1e2 * size
 
 
 def test_invariant_first_order_of_the_standing_ring_stays_still(bench):
     """Invariant: an eccentric outer groove displaces the ring for good and moves nothing."""
     found = followed(bench, outer_roundness=waviness((1, 2e-6, 0.2)))
     assert found.path[:, 0] == pytest.approx(2e-6 * math.cos(0.2), rel=1e-4)
-    assert found.runout(FACE).indicator < 1e-10
+    assert found.runout(FACE).indicator_um < 1e-4
 
 
 def test_invariant_side_sway_of_first_order_is_a_tilt(bench):
     """Invariant: side-sway b of the inner groove tilts the ring by b over the lever and leaves its centre in place."""
     size = 1e-6
     found = followed(bench, inner_sway=waviness((1, size, 0.0))).runout(FACE)
-    assert found.face == pytest.approx(2.0 * size * FACE / bench.row.lever, rel=2e-3)
-    assert max(found.axial, found.indicator) < 1e-3 * size
+    assert found.face_um == pytest.approx(2e6 * size * FACE / bench.row.lever, rel=2e-3)
+    assert max(found.axial_um, found.indicator_um) < 1e3 * size
 
 
 def test_oracle_proportion_for_small_errors(bench, response):
@@ -200,7 +200,7 @@ def test_unit_design_meets_its_class(bench):
     assert found.check.agreeing == found.check.bearings == 6
     assert max(found.check.radial_rms, found.check.face_rms) < 0.05
     wide, fine = (design(bench, lot, radial_limit=limit, axial_limit=limit, **given) for limit in (2e-6, 1e-6))
-    assert fine.inner_sway == pytest.approx(0.5 * wide.inner_sway, rel=1e-3)
+    assert fine.inner_sway_um == pytest.approx(0.5 * wide.inner_sway_um, rel=1e-3)
     assert fine.check is None and fine.yielded == fine.proportional
 
 
@@ -279,7 +279,7 @@ def test_unit_path_of_a_scene():
         changes = (ECCENTRIC, "errors.steps=24", "errors.turns=2", f"operation.tilt={tilt}")
         found = follow_ring(BallScene.load(SCENE, changes))
         assert len(found.path) == 48 and found.turns == 2
-        assert found.runout(FACE).indicator == pytest.approx(2e-6, rel=1e-2)
+        assert found.runout(FACE).indicator_um == pytest.approx(2.0, rel=1e-2)
     assert np.abs(found.path[:, 3:]).max() == 0.0
 
 
@@ -288,8 +288,8 @@ def test_unit_turning_outer_ring():
     outside = ("operation.inner_speed_rpm=0.0", "operation.outer_speed_rpm=30.0", "errors.steps=24", "errors.turns=1")
     still = follow_ring(BallScene.load(SCENE, (ECCENTRIC, *outside)))
     moving = follow_ring(BallScene.load(SCENE, (ECCENTRIC.replace("inner", "outer"), *outside)))
-    assert still.runout(FACE).indicator < 1e-10
-    assert moving.runout(FACE).indicator == pytest.approx(2e-6, rel=1e-2)
+    assert still.runout(FACE).indicator_um < 1e-4
+    assert moving.runout(FACE).indicator_um == pytest.approx(2.0, rel=1e-2)
 
 
 @pytest.mark.parametrize(

@@ -133,9 +133,11 @@ def test_unit_eccentric_ring():
     """Unit: an eccentricity e reads 2e on an indicator and nothing between circles or as error motion."""
     e = 1e-6
     found = runout(path_of(e * np.cos(ANGLE), e * np.sin(ANGLE)), 1, 0.04)
-    assert found.indicator == pytest.approx(2.0 * e)
-    assert max(found.minimum_zone, found.least_squares, found.error_motion, found.axial, found.face) < 1e-15
-    assert found.asynchronous_radial == 0.0
+    assert found.indicator_um == pytest.approx(2e6 * e)
+    assert (
+        max(found.minimum_zone_um, found.least_squares_um, found.error_motion_um, found.axial_um, found.face_um) < 1e-9
+    )
+    assert found.asynchronous_radial_um == 0.0
 
 
 def test_unit_three_lobes():
@@ -149,7 +151,7 @@ def test_unit_face_runout_of_a_tilt():
     """Unit: a ring that wobbles by an angle reads twice angle times radius on its face and nothing at its centre."""
     path = path_of(0.0 * ANGLE, 0.0, 0.0, 1e-5 * np.cos(ANGLE), 1e-5 * np.sin(ANGLE))
     assert face_runout(path, 0.04) == pytest.approx(2.0 * 1e-5 * 0.04)
-    assert runout(path, 1, 0.04).axial == 0.0
+    assert runout(path, 1, 0.04).axial_um == 0.0
 
 
 def test_unit_synchronous_and_asynchronous_parts():
@@ -158,11 +160,11 @@ def test_unit_synchronous_and_asynchronous_parts():
     x, z = 1e-6 * np.cos(angle), 0.5e-6 * np.cos(2.0 * angle)
     slow, slow_axial = 0.2e-6 * np.cos(0.4 * angle), 0.1e-6 * np.cos(0.4 * angle)
     found = runout(path_of(x + slow, 0.0, z + slow_axial), 5, 0.04)
-    assert found.synchronous_radial == pytest.approx(2e-6, rel=1e-9)
-    assert found.synchronous_axial == pytest.approx(1e-6, rel=1e-9)
+    assert found.synchronous_radial_um == pytest.approx(2.0, rel=1e-9)
+    assert found.synchronous_axial_um == pytest.approx(1.0, rel=1e-9)
     # Five samples of a cosine, 144 degrees apart, span at most 2 cos(18 deg) of its amplitude.
-    assert found.asynchronous_radial == pytest.approx(0.2e-6 * 2.0 * math.cos(math.pi / 10.0), rel=1e-3)
-    assert found.asynchronous_axial == pytest.approx(0.1e-6 * 2.0 * math.cos(math.pi / 10.0), rel=1e-3)
+    assert found.asynchronous_radial_um == pytest.approx(0.2 * 2.0 * math.cos(math.pi / 10.0), rel=1e-3)
+    assert found.asynchronous_axial_um == pytest.approx(0.1 * 2.0 * math.cos(math.pi / 10.0), rel=1e-3)
 
 
 def test_unit_broken_turns_are_refused():

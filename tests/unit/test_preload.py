@@ -205,7 +205,7 @@ def test_invariant_a_row_of_a_sweep_is_the_equilibrium_at_its_value(source, key,
 def test_invariant_a_row_of_a_study_is_the_equilibrium_at_its_value(study, file, values):
     """Invariant: rows of --preload, --clearance and --wear are equilibria of the scene with that value and no other's."""
     whole = Scene.load(file, ["operation.preload_N=300.0"])
-    _, table = optimum_study(whole, study, values)
+    table = optimum_study(whole, study, values).table
     for place, value in enumerate(values):
         alone = {
             "preload": lambda force: whole.changed({"operation.preload_N": force}),

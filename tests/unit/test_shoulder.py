@@ -30,7 +30,7 @@ def edges(load: float) -> dict[str, float]:
     """Angle at the edge of each ellipse [deg]: alpha + asin(a Q^(1/3)/(f D)), Q = F/(Z sin alpha)."""
     scene = thrust(load)
     result = equilibrium(scene)
-    angle = math.radians(result.row_reports[""].balls[0]["inner_angle_deg"])
+    angle = math.radians(result.row_reports[""].balls[0].inner_angle_deg)
     model, force = row_of(scene), load / (14 * math.sin(angle))  # type: ignore[arg-type]
     contacts = {"inner": (model.inner_contact, 0.52), "outer": (model.outer_contact, 0.53)}
     return {
@@ -47,8 +47,8 @@ def test_the_note_says_by_how_much_an_ellipse_is_beyond_the_shoulder(race: str) 
         height = factor * 12.0 * (1.0 - math.cos(math.radians(edge - beyond)))
         result = equilibrium(thrust(load, **{f"{race}_shoulder_height_mm": height}))
         contact = result.row_reports[""].contacts[race]
-        assert contact["edge_angle_deg"] == pytest.approx(edge, abs=1e-6)
-        assert contact["shoulder_angle_deg"] == pytest.approx(edge - beyond, abs=1e-6)
+        assert contact.edge_angle_deg == pytest.approx(edge, abs=1e-6)
+        assert contact.shoulder_angle_deg == pytest.approx(edge - beyond, abs=1e-6)
         notes = [note for note in result.notes or () if f"over the stated {race} shoulder" in note]
         assert len(notes) == count
         if notes:
@@ -85,8 +85,8 @@ def test_a_shoulder_is_lower_than_its_groove_radius() -> None:
 def test_semi_axes_have_three_digits_and_no_exponent() -> None:
     shown = text(equilibrium_blocks(equilibrium(thrust(30_000.0))))
     contact = equilibrium(thrust(30_000.0)).row_reports[""].contacts["inner"]
-    assert 1.0 < contact["semi_major_mm"] < 10.0 and "e+" not in shown
-    major, minor = (float(f"{1e3 * contact[f'semi_{axis}_mm']:.3g}") for axis in ("major", "minor"))
+    assert 1.0 < contact.semi_major_mm < 10.0 and "e+" not in shown
+    major, minor = (float(f"{1e3 * axis:.3g}") for axis in (contact.semi_major_mm, contact.semi_minor_mm))
     assert f"semi-axes {major:.0f} x {minor:.0f} µm" in shown
 
 

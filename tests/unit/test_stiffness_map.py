@@ -43,8 +43,8 @@ def test_balls_have_the_stiffness_of_their_equilibrium():
     table = stiffness_map(BALLS, SPEEDS, [600.0]).sheet.frame
     scene = BallScene.load(BALLS, ["operation.inner_speed_rpm=8000", "operation.radial_load_N=600"])
     stiffness = equilibrium(scene).report.stiffness
-    assert table["kxx"][1] == pytest.approx(1e6 * stiffness["x_N_per_um"], rel=1e-6)
-    assert table["kyy"][1] == pytest.approx(1e6 * stiffness["y_N_per_um"], rel=1e-6)
+    assert table["kxx"][1] == pytest.approx(1e6 * stiffness.x_N_per_um, rel=1e-6)
+    assert table["kyy"][1] == pytest.approx(1e6 * stiffness.y_N_per_um, rel=1e-6)
 
 
 def test_heat_sets_the_clearance():

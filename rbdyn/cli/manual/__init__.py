@@ -59,7 +59,6 @@ def kinds() -> dict[str, type[BaseModel]]:
 
 def tables() -> dict[str, list[Sheet[Any]]]:
     """The files of tables that the commands write; those of ``rbdyn accuracy`` have the columns that its report explains."""
-    from rbdyn.cli.ball_studies import limit_sheet
     from rbdyn.cli.stiffness import stiffness_sheet
     from rbdyn.comparison import difference_sheet, input_sheet
     from rbdyn.dynamics.duty_simulation import points_sheet
@@ -68,6 +67,7 @@ def tables() -> dict[str, list[Sheet[Any]]]:
     from rbdyn.dynamics.slip_map import map_sheet
     from rbdyn.life import life_sheet
     from rbdyn.quasistatic.result import ball_sheet
+    from rbdyn.quasistatic.runout.lots import race_sheet
     from rbdyn.quasistatic.runout.turn import RUNOUT
     from rbdyn.quasistatic.sweep import SWEEPS
     from rbdyn.result import figure_sheet, start_sheet
@@ -76,7 +76,7 @@ def tables() -> dict[str, list[Sheet[Any]]]:
     named = [Column[Any](figure.key, meaning=figure.meaning) for figure in FIGURES]
     sheets: list[Sheet[Any]] = [
         figure_sheet({}), history_sheet(("{j}",)), start_sheet(), map_sheet((), figures), life_sheet(()), points_sheet((), figures), stiffness_sheet(()), input_sheet(()),
-        difference_sheet({}), ball_sheet({}), SWEEPS, RUNOUT, limit_sheet({}),
+        difference_sheet({}), ball_sheet({}), SWEEPS, RUNOUT, race_sheet(),
     ]  # fmt: skip
     return {
         "Tables of rbdyn": sheets,

@@ -21,8 +21,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbdyn.base.arrays import Array, Whole
+from rbdyn.base.blocks import Sheet, columns_of
 from rbdyn.base.faults import InputError, MethodError, RunError
-from rbdyn.base.records import Record
+from rbdyn.base.records import Record, keyed, outside_json, shown
 from rbdyn.quasistatic.row.ball import Control
 from rbdyn.quasistatic.row.equilibrium import Solution, solve
 from rbdyn.quasistatic.row.model import constraint_of, load_of, row_of
@@ -239,28 +240,48 @@ class FullCheck(Record):
     gap_error: float
 
 
-class RaceLimits(Record):
-    """Limits [m] on the heights of race errors, and their yield.
+class RaceHeights(Record):
+    """Heights of the errors of a race."""
 
-    ``radial_limit, axial_limit``: limits K_ia and S_ia of the class [m]. ``yielded``: share of a fresh lot that meets both,
-    with its standard error. It is counted on many linear responses and corrected by full equilibria of some bearings
-    (``check``); ``proportional`` is the share without that correction. ``homogenisation``: 95 % quantile of the radial
+    race: str = shown("race", meaning="inner or outer")
+    roundness_um: float = shown(
+        "roundness up to [µm]", ".3g", meaning="largest roundness and side-sway that meet the class"
+    )
+    sway_um: float = shown("side-sway up to [µm]", ".3g")
+
+
+def race_sheet(*races: RaceHeights) -> Sheet[RaceHeights]:
+    """A row a race."""
+    content = "One row per raceway, of `rbdyn ball --race-limits`."
+    return Sheet("", columns_of(RaceHeights), races, file="race_limits.csv", content=content)
+
+
+class RaceLimits(Record, kw_only=True):
+    """Limits on the heights of race errors, and their yield.
+
+    ``tolerance_class``: of ``radial_limit_um`` and ``axial_limit_um``, its limits K_ia and S_ia. ``yielded``: share of a fresh lot
+    that meets both, with its standard error. It is counted on many linear responses and corrected by full equilibria of some bearings
+    (``check``); ``proportional`` is the share without that correction. Homogenisation: 95 % quantile of the radial
     runout over the sum of both roundness limits, and of the face runout over the sum of both side-sway limits.
     """
 
-    inner_roundness: float
-    outer_roundness: float
-    inner_sway: float
-    outer_sway: float
-    radial_limit: float
-    axial_limit: float
-    yielded: float
+    tolerance_class: str | None = keyed("class", default=None)
+    target_yield: float = keyed("wanted")
+    inner_roundness_um: float
+    outer_roundness_um: float
+    inner_sway_um: float
+    outer_sway_um: float
+    radial_limit_um: float
+    axial_limit_um: float
+    yielded: float = keyed("yield")
     standard_error: float
-    proportional: float
-    homogenisation: tuple[float, float]
+    proportional: float = keyed("yield_in_proportion")
+    radial_homogenisation: float = keyed("homogenisation", "radial")
+    axial_homogenisation: float = keyed("homogenisation", "axial")
     bearings: int
+    solved: int = keyed("solved_in_full")
     seed: int
-    check: FullCheck | None
+    check: FullCheck | None = outside_json()
 
 
 class Bench(Record):
@@ -323,17 +344,17 @@ def design(
     proportional = float(good.mean())
     gap, gap_error = (0.0, 0.0) if check is None else (check.gap, check.gap_error)
     return RaceLimits(
-        **dict(zip(RACES, limits.tolist(), strict=True)),
-        radial_limit=radial_limit,
-        axial_limit=axial_limit,
+        target_yield=target_yield,
+        **{f"{race}_um": 1e6 * limit for race, limit in zip(RACES, limits.tolist(), strict=True)},
+        radial_limit_um=1e6 * radial_limit,
+        axial_limit_um=1e6 * axial_limit,
         yielded=min(proportional + gap, 1.0),
         standard_error=math.hypot(math.sqrt(proportional * (1.0 - proportional) / bearings), gap_error),
         proportional=proportional,
-        homogenisation=(
-            float(np.quantile(radial, 0.95) / limits[:2].sum()),
-            float(np.quantile(face, 0.95) / limits[2:].sum()),
-        ),
+        radial_homogenisation=float(np.quantile(radial, 0.95) / limits[:2].sum()),
+        axial_homogenisation=float(np.quantile(face, 0.95) / limits[2:].sum()),
         bearings=bearings,
+        solved=solved,
         seed=seed,
         check=check,
     )

@@ -100,23 +100,23 @@ STEPS = 60
 
 
 class Runout(Record):
-    """Runout [m] of a path of whole turns.
+    """Runout of a path of whole turns.
 
     ``axial``: range of the axial displacement. ``face``: range of an axial indicator at the worst position on the ring's
     face, tilt included. Synchronous: indicator reading of the mean over turns at equal ring angle. Asynchronous: largest
     spread between turns at equal ring angle, zero for one turn.
     """
 
-    indicator: float
-    minimum_zone: float
-    least_squares: float
-    error_motion: float
-    axial: float
-    face: float
-    synchronous_radial: float
-    asynchronous_radial: float
-    synchronous_axial: float
-    asynchronous_axial: float
+    indicator_um: float
+    minimum_zone_um: float
+    least_squares_um: float
+    error_motion_um: float
+    axial_um: float
+    face_um: float
+    synchronous_radial_um: float
+    asynchronous_radial_um: float
+    synchronous_axial_um: float
+    asynchronous_axial_um: float
     turns: int
 
 
@@ -138,16 +138,16 @@ def runout(path: Array, turns: int, face_radius: float) -> Runout:
     by_turn, axial_by_turn = orbit.reshape(turns, steps, 2), axial.reshape(turns, steps)
     angle = 2.0 * math.pi * np.arange(len(path)) / steps
     return Runout(
-        indicator=diameter(orbit),
-        minimum_zone=minimum_zone(orbit).width,
-        least_squares=least_squares_circle(orbit).width,
-        error_motion=max(error_motion(angle, reading) for reading in orbit.T),
-        axial=float(np.ptp(axial)),
-        face=face_runout(path, face_radius),
-        synchronous_radial=diameter(by_turn.mean(axis=0)),
-        asynchronous_radial=max(diameter(by_turn[:, step]) for step in range(steps)),
-        synchronous_axial=float(np.ptp(axial_by_turn.mean(axis=0))),
-        asynchronous_axial=float(np.ptp(axial_by_turn, axis=0).max()),
+        indicator_um=1e6 * diameter(orbit),
+        minimum_zone_um=1e6 * minimum_zone(orbit).width,
+        least_squares_um=1e6 * least_squares_circle(orbit).width,
+        error_motion_um=1e6 * max(error_motion(angle, reading) for reading in orbit.T),
+        axial_um=1e6 * float(np.ptp(axial)),
+        face_um=1e6 * face_runout(path, face_radius),
+        synchronous_radial_um=1e6 * diameter(by_turn.mean(axis=0)),
+        asynchronous_radial_um=1e6 * max(diameter(by_turn[:, step]) for step in range(steps)),
+        synchronous_axial_um=1e6 * float(np.ptp(axial_by_turn.mean(axis=0))),
+        asynchronous_axial_um=1e6 * float(np.ptp(axial_by_turn, axis=0).max()),
         turns=turns,
     )
 
