@@ -264,6 +264,11 @@ class ToleranceBox(Record, eq=False):
         low, high = (np.quantile(values, side, axis=1) for side in (1.0 - share, share))
         return Judged(costs, goals.violations(low - below, high + above))
 
+    def farthest(self, barred: Barred, points: Array) -> Array:
+        """How far (n,) the farthest corner of the box about each of the points (n, k) lies in what is ``barred``."""
+        corners = self.half * np.array(list(product((-1.0, 1.0), repeat=self.half.size)))
+        return barred((points[:, None] + corners).reshape(-1, self.half.size)).reshape(len(points), -1).max(axis=1)
+
     def parts(self, surfaces: Sequence[Quadratic], points: Array, samples: int | None = None) -> Array:
         """Responses (n, s, m) of parts at coded nominal points (n, k)."""
         offset = self.half * even_offsets(samples or self.samples, self.half.size, self.distribution)
@@ -335,13 +340,15 @@ def tolerance_aware_front(
     baseline : coded point (k,) to improve on. If robust costs of any point dominate its nominal costs, picks are among such
         points, else among those that dominate its robust costs.
     plain, plain_pick : coded points and costs of the plain front, and the row of its pick.
-    population, generations, seed, keep, pick, doubt, barred : as for `doe.pareto.front`, of coded points.
+    population, generations, seed, keep, pick, doubt : as for `doe.pareto.front`, of coded points.
+    barred : where no corner of a tolerance box may lie.
 
     Raises ValueError when a setting of the search is impossible; InfeasibleError when no point keeps all limits.
     """
     check_search(lower, upper, population, generations, keep)
     judge = partial(box.judge, surfaces, goals)
-    searched = search(barring(partial(judge, doubt=doubt), barred), lower, upper, population, generations, seed)
+    barred_parts = None if barred is None else partial(box.farthest, barred)
+    searched = search(barring(partial(judge, doubt=doubt), barred_parts), lower, upper, population, generations, seed)
     points, costs = searched.archive
     nominal_baseline = goals.costs(_nominal(surfaces, baseline[None]))[0]
     baseline_costs = judge(baseline[None]).costs[0]

@@ -136,13 +136,17 @@ def test_a_limit_that_the_tolerances_break_is_an_obstacle_too(tmp_path, monkeypa
         "No point meets all limits at the ends of the factors' own tolerances: the closest violates impact"
     )
     assert commanded(path, "-q").exit_code == 1
-    # If only 95 % of the parts have to keep it, those about the simulated design do, within the same tolerances.
+
+
+def test_no_obstacle_where_the_parts_about_the_simulated_design_keep_the_limit(tmp_path, monkeypatch):
+    """By the surfaces no point has 95 % of its parts within the limit; by simulation, which is lower, the selected design has."""
+    biased(monkeypatch.setattr, -1.0)
     aware = ('tolerance_aware = "none"', 'tolerance_aware = "quantile"')
-    answer = doe.study(limited_study(tmp_path, "upper = 24.5", [QUICK, aware]), tmp_path / "quantile")
+    answer = doe.study(limited_study(tmp_path, "upper = 24.0", [QUICK, aware]), tmp_path / "quantile")
+    assert "tolerance_aware" not in answer["front"]
     assert answer["status"] == "ok" and not answer["obstacles"]["sentences"]
-    assert {name: tolerance["half_width"] for name, tolerance in answer["tolerances"].items()} == pytest.approx(
-        {"radial_clearance_mm": 0.003, "guide_clearance_mm": 0.02, "pocket_clearance_mm": 0.005}
-    )
+    own = Problem.load(tmp_path / "study.toml").known_tolerances
+    assert all(answer["tolerances"][name]["half_width"] >= width * (1.0 - 1e-9) for name, width in own.items())
 
 
 def test_an_adaptive_search_that_comes_nowhere_near_leaves_the_pick_to_the_surfaces(tmp_path, monkeypatch):

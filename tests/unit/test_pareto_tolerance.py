@@ -151,27 +151,36 @@ def test_wide_tolerances_cost_and_parts_fail():
     assert (np.abs(found.points) <= 2.0).all()
 
 
-def test_nominal_points_reach_the_bounds_of_the_region_and_parts_lie_beyond():
-    # Both costs fall with x: the front is at the bound, and the worst part is a tolerance short of it.
-    falling = [
-        Quadratic(0.0, np.array([-1.0, 0.0]), np.diag([0.0, 1.0])),
-        Quadratic(0.0, np.array([-2.0, 1.0]), np.diag([0.0, 1.0])),
-    ]
+def falling(**settings):
+    """The front of two costs that fall with x, searched from -1 to 1 with a tolerance of 0.1."""
+    surfaces = [Quadratic(0.0, np.array([slope, 0.0]), np.diag([0.0, 1.0])) for slope in (-1.0, -2.0)]
     points = np.array([[1.0, 0.0], [0.9, 0.0]])
-    found = tolerance_aware_front(
-        falling,
+    return tolerance_aware_front(
+        surfaces,
         ToleranceBox(np.full(2, 0.1)),
         np.full(2, -1.0),
         np.full(2, 1.0),
         Goals.of(["min", "min"]),
         baseline=np.zeros(2),
-        plain=Archive(points, np.column_stack([surface.predict(points) for surface in falling])),
+        plain=Archive(points, np.column_stack([surface.predict(points) for surface in surfaces])),
         plain_pick=0,
         population=40,
         generations=30,
+        **settings,
     )
+
+
+def test_designs_reach_the_bounds_of_the_region_and_parts_lie_beyond():
+    found = falling()
     assert found.points[:, 0] == pytest.approx(1.0, abs=1e-3)
-    assert found.plain_pick_costs == pytest.approx([-0.9 + 0.01, -1.8 + 0.11])
+    # The worst part is a tolerance short of the bound in x, and a tolerance off in y.
+    assert found.plain_pick_costs == pytest.approx([-0.9 + 0.01, -1.8 + 0.01])
+
+
+def test_no_part_lies_where_points_are_barred():
+    found = falling(barred=lambda points: points[:, 0] - 0.5)
+    assert found.points[:, 0] == pytest.approx(0.4, abs=1e-3)
+    assert found.points[:, 0].max() <= 0.4
 
 
 def first_factor(points):
