@@ -258,7 +258,9 @@ def _scale(violations: Array) -> Array:
 
 def _evolve(judge: Judge, low: Array, high: Array, population: int, generations: int, seed: int) -> History:
     from pymoo.algorithms.moo.nsga2 import NSGA2
+    from pymoo.core.duplicate import DefaultDuplicateElimination
     from pymoo.core.problem import Problem
+    from pymoo.core.repair import NoRepair
     from pymoo.optimize import minimize
 
     history: History = []
@@ -274,9 +276,19 @@ def _evolve(judge: Judge, low: Array, high: Array, population: int, generations:
                 out["G"] = judged.violations / scale
             history.append((x.copy(), Judged(judged.costs.copy(), judged.violations.copy())))
 
+    class Lean(NSGA2):
+        def _set_optimum(self) -> None:
+            """The best of a generation, which nobody reads here."""
+
+    class Unchanged(NoRepair):
+        def do(self, _: Problem, offspring: Any, **named: Any) -> Any:
+            return offspring
+
+    distinct = DefaultDuplicateElimination(func=lambda offspring: np.array([point.X for point in offspring]))
     count = sample.costs.shape[1]
     problem = Recorded(n_var=low.size, n_obj=count, n_ieq_constr=scale.size, xl=low, xu=high)
-    minimize(problem, NSGA2(pop_size=population), ("n_gen", generations), seed=seed)
+    method = Lean(pop_size=population, eliminate_duplicates=distinct, repair=Unchanged())
+    minimize(problem, method, ("n_gen", generations), seed=seed)
     return history
 
 
