@@ -59,6 +59,7 @@ def code_behind(roots: Sequence[str], texts: Mapping[Path, str] = MappingProxyTy
     return code
 
 
+@functools.cache  # a command states several digests, of much the same modules
 def what_runs(text: str) -> str:
     """Source text without docstrings, comment lines, empty lines and imports for typing only."""
 
