@@ -282,14 +282,14 @@ def confirmation_sheet(
 
 def response_surface(study: Problem, surface: Surface, path: Path) -> None:
     """Surface over the first factor and each other one, the rest at their centre, with contours below."""
-    from matplotlib import pyplot as plt
     from matplotlib.ticker import MaxNLocator
 
-    plt.switch_backend("Agg")
+    from rbdyn.plots.style import PNG, blank
+
     factors, response = len(study.factors), Asked.of(study).response(surface.name)
     reach = study.design.reach
     grid = np.linspace(-reach, reach, 41)
-    figure = plt.figure(figsize=(6.2 * (factors - 1), 5.2))
+    figure = blank((6.2 * (factors - 1), 5.2))
     for panel in range(1, factors):
         coded = np.zeros((grid.size, grid.size, factors))
         coded[..., 0], coded[..., panel] = np.meshgrid(grid, grid, indexing="ij")
@@ -323,5 +323,4 @@ def response_surface(study: Problem, surface: Surface, path: Path) -> None:
             side.set_major_locator(MaxNLocator(4))
         axis.view_init(elev=24, azim=-128)
     figure.subplots_adjust(left=0.02, right=0.92, bottom=0.06, top=0.94, wspace=0.12)
-    figure.savefig(path, dpi=130)
-    plt.close(figure)
+    figure.savefig(path, dpi=130, pil_kwargs=PNG)

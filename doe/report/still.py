@@ -86,8 +86,10 @@ def save(stills: Sequence[Still], path: Path) -> None:
     """The pictures in rows of three as one PNG, of four in two rows; all as wide as the first."""
     import matplotlib
 
+    from rbdyn.plots.style import PNG
+
     with matplotlib.rc_context(STYLE):
-        _figure(stills, 2 if len(stills) == 4 else 3).savefig(path, dpi=130)
+        _figure(stills, 2 if len(stills) == 4 else 3).savefig(path, dpi=130, pil_kwargs=PNG)
 
 
 def name_marks(artist: "Artist", role: str, titles: Sequence[str] = ()) -> None:

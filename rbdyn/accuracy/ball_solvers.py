@@ -130,9 +130,9 @@ def draw(attempts: Sequence[Attempt], path: Path) -> None:
     """Residual of each solver stopped after more and more iterations, against its time."""
     from matplotlib.ticker import LogLocator
 
-    from rbdyn.plots.style import label_ends, logarithmic, method_lines, plt, save
+    from rbdyn.plots.style import label_ends, logarithmic, method_lines, save, subplots
 
-    figure, axis = plt.subplots(figsize=(7.6, 5.0))
+    figure, axis = subplots(figsize=(7.6, 5.0))
     logarithmic(axis, "residual over the largest force", "time of a call [us]")
     axis.xaxis.set_major_locator(LogLocator(base=100.0, numticks=12))
     lines: dict[str, list[tuple[float, float]]] = {}

@@ -543,9 +543,9 @@ def times_faster(ours: Curve, theirs: Curve) -> Speedup | None:
 
 def _draw(attempts: Sequence[Attempt], floor: float, turns: float, path: Any) -> None:
     """Position error of each method against the time of a shaft turn; crosses at the right edge failed."""
-    from rbdyn.plots.style import GREY, failed_at_the_edge, label_ends, logarithmic, method_lines, plt, save
+    from rbdyn.plots.style import GREY, failed_at_the_edge, label_ends, logarithmic, method_lines, save, subplots
 
-    figure, axis = plt.subplots(figsize=(8.6, 6.0))
+    figure, axis = subplots(figsize=(8.6, 6.0))
     across = f"largest position error after {turns:g} shaft turns, worst of the starts [m]"
     logarithmic(axis, across, "processor time of a shaft turn [ms]")
     lines: dict[str, list[tuple[float, float]]] = {attempt.method: [] for attempt in attempts}

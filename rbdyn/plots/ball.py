@@ -5,11 +5,12 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import matplotlib
 import numpy as np
 
 from rbdyn.base.arrays import Array
 from rbdyn.base.words import quantity
-from rbdyn.plots.style import BLUE, GREEN, GREY, INNER, ORANGE, OUTER, Axes, Line2D, plain, plt, save
+from rbdyn.plots.style import BLUE, GREEN, GREY, INNER, ORANGE, OUTER, Axes, Line2D, blank, plain, save, subplots
 
 if TYPE_CHECKING:
     from rbdyn.quasistatic.result import Ball, BallResult
@@ -52,7 +53,7 @@ def closed(values: Array) -> Array:
 
 def loads(rows: Mapping[str, Balls], path: Path) -> None:
     """Contact loads around each row, azimuth 0 (the direction of x) below; the difference between the races is centrifugal."""
-    figure = plt.figure(figsize=(5.2 * len(rows), 5.2))
+    figure = blank((5.2 * len(rows), 5.2))
     for place, (title, balls) in enumerate(rows.items(), 1):
         axis: Any = figure.add_subplot(1, len(rows), place, projection="polar")
         axis.set_theta_zero_location("S")
@@ -74,7 +75,7 @@ def loads(rows: Mapping[str, Balls], path: Path) -> None:
 
 def angles(rows: Mapping[str, Balls], path: Path) -> None:
     """Contact angles against azimuth; a ball without an inner contact leaves a gap in the inner line."""
-    figure, axes = plt.subplots(1, len(rows), figsize=(5.8 * len(rows), 3.8), squeeze=False)
+    figure, axes = subplots(1, len(rows), figsize=(5.8 * len(rows), 3.8), squeeze=False)
     for axis, (title, balls) in zip(axes[0], rows.items(), strict=True):
         angles_on(axis, balls, {"inner": INNER, "outer": OUTER}, {"inner": "inner raceway", "outer": "outer raceway"})
         axis.set_title(title, fontsize=10)
@@ -99,7 +100,7 @@ def angles_on(
 def section(rows: Mapping[str, Balls], bearing: Mapping[str, Any], path: Path) -> None:
     """Axial section of each row at its most loaded ball, to scale: grooves, contact lines, angles and loads."""
     drawings = [bearing] if len(rows) == 1 else [bearing["inner"], bearing["outer"]]
-    figure, axes = plt.subplots(1, len(rows), figsize=(5.6 * len(rows), 5.9), squeeze=False)
+    figure, axes = subplots(1, len(rows), figsize=(5.6 * len(rows), 5.9), squeeze=False)
     for axis, (title, balls), drawing in zip(axes[0], rows.items(), drawings, strict=True):
         place = int(np.argmax(column(balls, "inner_load_N")))
         _section_on(axis, balls[place], drawing)
@@ -211,7 +212,7 @@ def label(key: str) -> str:
 def angles_over_key(result: "SweepResult", path: Path) -> None:
     """Range of the contact angles of all balls, on both races."""
     rows = _rows(result)
-    figure, axes = plt.subplots(1, len(rows), figsize=(5.8 * len(rows), 4.0), squeeze=False)
+    figure, axes = subplots(1, len(rows), figsize=(5.8 * len(rows), 4.0), squeeze=False)
     for axis, (title, prefix) in zip(axes[0], rows.items(), strict=True):
         for race, colour in (("inner", INNER), ("outer", OUTER)):
             for x, style, _, pick in _lines(result):
@@ -226,7 +227,7 @@ def angles_over_key(result: "SweepResult", path: Path) -> None:
 def pressure_and_life(result: "SweepResult", path: Path) -> None:
     """Peak Hertz pressure of both races, and L10; a dot where each is best."""
     rows = _rows(result)
-    figure, axes = plt.subplots(len(rows), 2, figsize=(10.4, 3.8 * len(rows)), squeeze=False)
+    figure, axes = subplots(len(rows), 2, figsize=(10.4, 3.8 * len(rows)), squeeze=False)
     for (pressure, life), (title, prefix) in zip(axes, rows.items(), strict=True):
         for x, style, _, pick in _lines(result):
             both = [pick(f"{prefix}{race}_pressure_MPa") for race in ("inner", "outer")]
@@ -245,7 +246,7 @@ def pressure_and_life(result: "SweepResult", path: Path) -> None:
 
 def stiffness(result: "SweepResult", path: Path) -> None:
     """Diagonal stiffnesses of the inner ring: across and along the axis, and against tilting."""
-    figure, (shift, tilt) = plt.subplots(1, 2, figsize=(10.4, 3.8))
+    figure, (shift, tilt) = subplots(1, 2, figsize=(10.4, 3.8))
     for x, style, _, pick in _lines(result):
         for axis_name, colour in (("x", BLUE), ("y", ORANGE), ("z", GREEN)):
             values = pick(f"stiffness_{axis_name}_N_per_um")
@@ -265,8 +266,8 @@ def azimuth(result: "SweepResult", path: Path) -> None:
     sample = [places[i] for i in np.unique(np.linspace(0, len(places) - 1, MOST_LINES).round().astype(int))]
     balls = [result.balls_at(place) for place in sample]
     rows = _rows(result)
-    figure, axes = plt.subplots(2, len(rows), figsize=(5.8 * len(rows), 6.4), squeeze=False, sharex=True)
-    shades = plt.get_cmap("viridis")(np.linspace(0.0, 0.88, len(sample)))
+    figure, axes = subplots(2, len(rows), figsize=(5.8 * len(rows), 6.4), squeeze=False, sharex=True)
+    shades = matplotlib.colormaps["viridis"](np.linspace(0.0, 0.88, len(sample)))
     for title, name, pair in zip(rows, result.figures, axes.T, strict=True):
         for axis, race in zip(pair, ("inner", "outer"), strict=True):
             for place, records, shade in zip(sample, balls, shades, strict=True):
@@ -285,7 +286,7 @@ def maps(result: "SweepResult", path: Path) -> None:
     panels += ROUND_MAPS
     across = 3 if len(rows) == 1 else len(MAPS)
     lines = -(-len(panels) // across)
-    figure, axes = plt.subplots(lines, across, figsize=(4.7 * across, 3.8 * lines))
+    figure, axes = subplots(lines, across, figsize=(4.7 * across, 3.8 * lines))
     (first, heights), (last, widths) = result.keys.items()
     for axis, (column, text, log) in zip(axes.ravel(), panels, strict=False):
         values = _finite(result.grid(column))

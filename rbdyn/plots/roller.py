@@ -61,7 +61,7 @@ def cage_orbit(
     ``classes``: of the cage by the title of its history, which names and colours its path.
     """
     columns = len(histories)
-    figure, axes = style.plt.subplots(3, columns, figsize=(4.8 * columns, 12.6), squeeze=False)
+    figure, axes = style.subplots(3, columns, figsize=(4.8 * columns, 12.6), squeeze=False)
     for column, (title, history) in zip(axes.T, histories.items(), strict=True):
         x, y = (1e6 * part for part in history.guide_eccentricity)
         colour = style.CAGE_COLOURS.get(classes.get(title, ""), style.BLUE)
@@ -75,9 +75,7 @@ def cage_orbit(
         column[0].set_title(f"{title}; cage: {classes[title]}" if title in classes else title)
         column[1].set_title("enlarged")
     # Below the figure, where no orbit runs.
-    figure.legend(
-        *axes[0][0].get_legend_handles_labels(), loc="upper center", bbox_to_anchor=(0.5, 0.0), ncol=3, fontsize=8
-    )
+    figure.legend(*axes[0][0].get_legend_handles_labels(), loc="lower center", ncol=3, fontsize=8)
     style.save(figure, path)
 
 
@@ -118,7 +116,7 @@ def _legend_above(axis: Axes) -> None:
 def pocket_forces(histories: "Mapping[str, History]", path: Path) -> None:
     """Wall forces of the pockets with the largest forces over time, a panel each."""
     rows = len(histories)
-    figure, axes = style.plt.subplots(rows, 1, figsize=(9.0, 3.0 * rows), squeeze=False, sharex=True)
+    figure, axes = style.subplots(rows, 1, figsize=(9.0, 3.0 * rows), squeeze=False, sharex=True)
     for axis, (title, history) in zip(axes[:, 0], histories.items(), strict=True):
         _draw_pockets(axis, history)
         axis.set_title(title, loc="left")
@@ -130,7 +128,7 @@ def pocket_forces(histories: "Mapping[str, History]", path: Path) -> None:
 def forces(history: "History", path: Path) -> None:
     """Wall forces of the pockets with the largest forces, and the land's dry load, over time; the largest marked."""
     touched = bool(history.land_load.any())
-    figure, axes = style.plt.subplots(1 + touched, 1, figsize=(9.0, 3.4 + 2.2 * touched), squeeze=False, sharex=True)
+    figure, axes = style.subplots(1 + touched, 1, figsize=(9.0, 3.4 + 2.2 * touched), squeeze=False, sharex=True)
     pockets = axes[0, 0]
     _draw_pockets(pockets, history)
     hit = motion.largest(history, history.pocket_load)
@@ -164,7 +162,7 @@ def whirl(history: "History", path: Path) -> None:
     """Distribution of the instantaneous whirl ratio, with its median, its quartiles and the mean ratio."""
     edges, density = motion.whirl_histogram(history)
     quantiles = motion.whirl_quantiles(history)
-    figure, axis = style.plt.subplots(figsize=(6.4, 4.0))
+    figure, axis = style.subplots(figsize=(6.4, 4.0))
     axis.stairs(density, edges, fill=True, color=style.SKY)
     axis.axvspan(quantiles[0.25], quantiles[0.75], color=style.GREY, alpha=0.15, linewidth=0, label="middle half")
     axis.axvline(quantiles[0.5], color=style.BLUE, linewidth=1.4, label=f"median {quantiles[0.5]:.3g}")
@@ -179,7 +177,7 @@ def whirl(history: "History", path: Path) -> None:
 def section(history: "History", path: Path) -> None:
     """Poincare sections: the cage centre once a shaft turn and once a cage turn, on its orbit."""
     x, y = (1e6 * part for part in history.guide_eccentricity)
-    figure, axes = style.plt.subplots(1, 2, figsize=(9.6, 5.4))
+    figure, axes = style.subplots(1, 2, figsize=(9.6, 5.4))
     turns: tuple[Literal["shaft", "cage"], ...] = ("shaft", "cage")
     for axis, turn_of in zip(axes, turns, strict=True):
         place_x, place_y = motion.poincare(history, turn_of)
@@ -196,7 +194,7 @@ def spectra(history: "History", path: Path) -> None:
     cage = abs(motion.mean_cage_speed(history)) / (2.0 * np.pi)
     passing = cage * history.scene.bearing.rollers
     lines = {"cage": cage, "shaft": 1.0 / history.scene.turn_s, "roller passing": passing}
-    figure, axes = style.plt.subplots(2, 1, figsize=(9.0, 6.2), sharex=True)
+    figure, axes = style.subplots(2, 1, figsize=(9.0, 6.2), sharex=True)
     signals = (
         (motion.spectrum(history, motion.eccentricity(history)), 1e6, "eccentricity of the cage", "µm"),
         (motion.spectrum(history, history.cage_speed), 30.0 / np.pi, "cage speed", "rpm"),
@@ -228,7 +226,7 @@ def _around(axis: Axes, history: "History", values: np.ndarray, factor: float, c
 
 def roller_loads(history: "History", path: Path) -> None:
     """Load of a roller on both races against azimuth: mean, and the band of nine tenths."""
-    figure, axis = style.plt.subplots(figsize=(7.0, 4.2))
+    figure, axis = style.subplots(figsize=(7.0, 4.2))
     _around(axis, history, history.outer_load, 1.0, style.OUTER, "outer raceway")
     _around(axis, history, history.inner_load, 1.0, style.INNER, "inner raceway")
     axis.set_ylim(bottom=0.0)
@@ -239,7 +237,7 @@ def roller_loads(history: "History", path: Path) -> None:
 
 def sliding(history: "History", path: Path) -> None:
     """Slip, pressure times sliding speed, and heat at both races against azimuth."""
-    figure, axes = style.plt.subplots(3, 1, figsize=(7.0, 8.4), sharex=True)
+    figure, axes = style.subplots(3, 1, figsize=(7.0, 8.4), sharex=True)
     pressed = motion.pressure_velocity(history, "outer"), motion.pressure_velocity(history, "inner")
     panels = (
         ("slip: ring less\nroller surface [m/s]", 1.0, history.outer_slip, history.inner_slip),
@@ -261,7 +259,7 @@ def power_by_loss(terms: Mapping[str, float], path: Path) -> None:
     total = sum(abs(power) for power in terms.values())
     largest = {term: power for term, power in terms.items() if abs(power) > SMALLEST_SHARE * total}
     names = sorted(largest, key=lambda term: largest[term])
-    figure, axis = style.plt.subplots(figsize=(7.0, 1.2 + 0.38 * max(len(names), 1)))
+    figure, axis = style.subplots(figsize=(7.0, 1.2 + 0.38 * max(len(names), 1)))
     bars = axis.barh([name.replace("_", " ") for name in names], [largest[name] for name in names], color=style.BLUE)
     axis.bar_label(bars, fmt="%.3g", padding=3, fontsize=9)
     axis.set_xlabel(f"mean power lost [W], {sum(terms.values()):.4g} W in all")
@@ -285,7 +283,7 @@ def draw_slip_map(
     width = max(4.2, 0.85 * len(slip_map.columns) + 2.0)
     count = len(PANELS) + bool(slip_map.cages)
     rows = math.ceil(count / 2)
-    figure, axes = style.plt.subplots(rows, 2, figsize=(2.0 * width, rows * max(3.2, 0.5 * len(slip_map.rows) + 1.8)))
+    figure, axes = style.subplots(rows, 2, figsize=(2.0 * width, rows * max(3.2, 0.5 * len(slip_map.rows) + 1.8)))
     for axis in axes.ravel()[count:]:
         axis.set_axis_off()
     for axis, panel in zip(axes.ravel(), PANELS, strict=False):
@@ -339,7 +337,7 @@ def stiffness_over_clearance(scene: "Scene", path: Path) -> None:
     largest = max(abs(operating), abs(scene.bearing.radial_clearance), 1e-6)
     clearances = np.sort([*np.linspace(*CLEARANCE_SPAN, CLEARANCE_POINTS) * largest, operating])
     rows = [stiffness_row(scene, float(clearance)) for clearance in clearances]
-    figure, (above, below) = style.plt.subplots(2, 1, figsize=(6.4, 5.6), sharex=True)
+    figure, (above, below) = style.subplots(2, 1, figsize=(6.4, 5.6), sharex=True)
     here = stiffness_row(scene, operating)
     for axis, place, words, colour in (
         (above, 0, "along the load", style.BLUE), (above, 1, "across the load", style.VERMILION), (below, 2, "", style.GREEN),
@@ -369,7 +367,7 @@ def draw_stiffness(
     speeds_rpm: Sequence[float], loads: Sequence[float], along: Array, across: Array, path: Path
 ) -> None:
     """Stiffness k_xx (full) and k_yy (dashed) [N/um], each (loads, speeds), over speed; a colour a load [N]."""
-    figure, axis = style.plt.subplots(figsize=(6.4, 4.2))
+    figure, axis = style.subplots(figsize=(6.4, 4.2))
     for colour, load, *rows in zip(itertools.cycle(style.METHOD_COLOURS[1:]), loads, along, across, strict=False):
         for name, row, line in zip(("k_xx", "k_yy"), rows, ("-", "--"), strict=True):
             axis.plot(speeds_rpm, row, color=colour, linestyle=line, label=f"{name}, {load:g} N")
@@ -425,7 +423,7 @@ def moving_bearing(history: "History", stem: Path) -> Path:
     from matplotlib import animation
 
     picture = drawing(history, TURNS, FRAMES_PER_TURN)
-    figure = style.plt.figure(figsize=(6.0, 6.6), dpi=80)
+    figure = style.blank((6.0, 6.6), dpi=80)
     axis = figure.add_axes((0.0, 0.0, 1.0, 6.0 / 6.6))
     figure.text(
         0.02, 0.975, f"clearances magnified {picture.magnification:g} times, rollers drawn smaller",
@@ -446,7 +444,6 @@ def moving_bearing(history: "History", stem: Path) -> Path:
     ffmpeg = animation.writers.is_available("ffmpeg")
     path = stem.with_suffix(".mp4" if ffmpeg else ".gif")
     film.save(path, writer=(animation.FFMpegWriter if ffmpeg else animation.PillowWriter)(fps=FRAMES_PER_SECOND))
-    style.plt.close(figure)
     return path
 
 

@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from rbdyn.clearances import REPORTED
-from rbdyn.plots.style import BLUE, GREEN, GREY, INNER, ORANGE, OUTER, PURPLE, SKY, plain, plt, save
+from rbdyn.plots.style import BLUE, GREEN, GREY, INNER, ORANGE, OUTER, PURPLE, SKY, blank, plain, save
 from rbdyn.result import StartResult
 
 # Nodes in words with their colours; rings are full lines with a band.
@@ -29,7 +29,7 @@ def start(record: StartResult, path: Path) -> None:
     """Temperatures at the left, each clearance or load at the right with its extreme; lighter: 90 % over the inputs."""
     shown = {f"{clearance.name}_um": f"{clearance.name} clearance [µm]" for clearance in REPORTED} | OF_BALLS
     names = [name for name in shown if name in record.path["figures"]]
-    figure = plt.figure(figsize=(10.0, 6.5))
+    figure = blank((10.0, 6.5))
     grid = figure.add_gridspec(len(names), 2)
     left = figure.add_subplot(grid[:, 0])
     times = np.array(record.path["time_s"])

@@ -265,7 +265,7 @@ def stored(folder: Path, made_of: str) -> Calibration | None:
 
 def draw_corner(calibration: Calibration, evidence: Evidence, path: Path) -> None:
     """The posterior of the inputs that contract most: each over its range before, each pair as a cloud."""
-    from rbdyn.plots.style import BLUE, GREY, plain, plt, save
+    from rbdyn.plots.style import BLUE, GREY, plain, save, subplots
 
     learned, inputs = calibration.learnt.learned, evidence.inputs
     ranked = sorted(range(len(inputs)), key=lambda place: -learned[inputs[place].key])
@@ -273,7 +273,7 @@ def draw_corner(calibration: Calibration, evidence: Evidence, path: Path) -> Non
     columns = [[row[inputs[place].key] for row in evidence.sample] for place in places]
     ranges = [evidence.values(place, (END, 1.0 - END)) for place in places]
     count = max(len(places), 1)
-    figure, axes = plt.subplots(count, count, figsize=(1.7 * count + 1.5, 1.7 * count + 0.8), squeeze=False)
+    figure, axes = subplots(count, count, figsize=(1.7 * count + 1.5, 1.7 * count + 0.8), squeeze=False)
     for (down, across), axis in np.ndenumerate(axes):
         if across > down or not places:
             axis.set_visible(False)
@@ -315,10 +315,10 @@ def _along(entry: Input, low: float, high: float, count: int) -> list[float]:
 
 def draw_compared(cells: Sequence[Cell], path: Path) -> None:
     """A panel for each output: deviations of the simulation before and after, by row, in percent of the measured values."""
-    from rbdyn.plots.style import BLUE, GREY, ORANGE, VERMILION, plain, plt, save
+    from rbdyn.plots.style import BLUE, GREY, ORANGE, VERMILION, plain, save, subplots
 
     outputs = list(dict.fromkeys(cell.output for cell in cells))
-    figure, axes = plt.subplots(1, len(outputs), figsize=(4.2 * len(outputs), 3.6), squeeze=False)
+    figure, axes = subplots(1, len(outputs), figsize=(4.2 * len(outputs), 3.6), squeeze=False)
     for axis, name in zip(axes[0], outputs, strict=True):
         plain(axis)
         data = [cell for cell in cells if cell.output == name]
@@ -339,5 +339,5 @@ def draw_compared(cells: Sequence[Cell], path: Path) -> None:
                               markersize=3.5, label=words)  # fmt: skip
         axis.set(xlabel="row", ylabel=f"{quantity(name)[0]}, off measured [%]", xticks=rows)
     handles, words = axes[0, 0].get_legend_handles_labels()
-    figure.legend(handles, words, fontsize=7, loc="lower center", ncols=len(words), bbox_to_anchor=(0.5, -0.06))
+    figure.legend(handles, words, fontsize=7, loc="lower center", ncols=len(words))
     save(figure, path)

@@ -255,7 +255,8 @@ def _dots(axis: "Axes", role: str, x: Sequence[float], y: Sequence[float]) -> No
             path, edgecolor=COLOURS[shade], facecolor="none", linewidth=width, capstyle="round", snap=False
         )
         name_marks(patch, f"dots {role}" if layer == 0 else "inside")
-        axis.add_patch(patch)
+        # Not as a patch: its extent, which the axes have, would take longer than the picture.
+        axis.add_artist(patch)
 
 
 def _mark(axis: "Axes", name: str, place: Point, simulated: bool = False) -> None:

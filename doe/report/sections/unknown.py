@@ -183,10 +183,10 @@ def write_uncertainty(uncertainty: Uncertainty, folder: Path) -> list[str]:
 
 def draw_uncertainty(uncertainty: Uncertainty, path: Path) -> None:
     """A column an output: above the runs of the input sets with the scene's own value, below what each input makes of them."""
-    from rbdyn.plots.style import BLUE, GREY, ORANGE, plain, plt, save
+    from rbdyn.plots.style import BLUE, GREY, ORANGE, plain, save, subplots
 
     count, keys = len(uncertainty.responses), [key.partition(".")[2] for key in uncertainty.keys]
-    figure, axes = plt.subplots(2, count, figsize=(3.4 * count + 2.0, 3.0 + 0.28 * len(keys)), squeeze=False,
+    figure, axes = subplots(2, count, figsize=(3.4 * count + 2.0, 3.0 + 0.28 * len(keys)), squeeze=False,
                                 height_ratios=(1.0, 0.14 * len(keys) + 0.3))  # fmt: skip
     for column, (name, output) in enumerate(uncertainty.responses.items()):
         above, below = axes[:, column]
