@@ -7,7 +7,6 @@ The engine of a cluster runs points on the workers of a dask scheduler, by dask.
 or a study, each into a store of its own, which are gathered.
 """
 
-import asyncio
 import json
 import logging
 import queue
@@ -463,6 +462,8 @@ def _loss(address: str, client: Any) -> StoppedError:
 
 async def _knock(address: str) -> None:
     """Shake hands with the scheduler, because a client without a scheduler would leave threads behind."""
+    import asyncio
+
     from distributed.comm import connect
 
     # The limit of connect alone would not end the wait for a server that accepts and stays silent.
@@ -472,6 +473,8 @@ async def _knock(address: str) -> None:
 
 @contextmanager
 def _client(address: str) -> Iterator[Any]:
+    import asyncio
+
     where = f"--scheduler {address}"
     try:
         import distributed

@@ -28,6 +28,7 @@ from rbdyn.scene import Scene
 
 # A run looks for interruptions between so many steps: some hundredths of a second, half a second by the implicit method.
 STEPS_AT_ONCE = 10_000
+STATUSES = tuple(advance.Status)
 LARGEST_STEP_TURNS = 0.02
 SMALLEST_STEP_TURNS = 1e-12
 
@@ -124,7 +125,7 @@ class Run:
             self.stop.check()
             control = self.control._replace(step_budget=min(self.steps + STEPS_AT_ONCE, budget))
             code = advance.advance(self.bearing, control, self.carry, self.tally, end, self.sample_step)
-            status = list(advance.Status)[code]
+            status = STATUSES[code]
             self.spent_s = time.perf_counter() - started
             if self.pace is not None:
                 turned = float(self.carry.clock[advance.NOW]) / self.scene.turn_s
