@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
+from itertools import product
 from typing import NamedTuple, TypeVar
 
 import numpy as np
@@ -49,7 +50,8 @@ def find_front(study: Problem, simulated: Sequence[Confirmed] = (), failed: int 
 
     Its points keep every limit with the probability that the study asks for. The back-off follows from the standard
     errors of the surfaces and from their misses at points ``simulated``; it shrinks where no point keeps all of it. Each
-    of the ``failed`` earlier picks shows that the errors are larger: the back-off grows by its own size.
+    of the ``failed`` earlier picks shows that the errors are larger: the back-off grows by its own size. Surfaces that exceed
+    a limit everywhere are corrected by their misses at the simulated points.
 
     Where no point keeps all limits, the front is the point that is expected to miss them least (see `ParetoFront.violations`).
     Raises InputError when fewer than two responses have a goal, or a tolerance is missing.
@@ -74,19 +76,17 @@ def find_front(study: Problem, simulated: Sequence[Confirmed] = (), failed: int 
 
     with named_faults(study, lambda point: point, ""):
         try:
-            pareto = _backed_off(study, lambda share: plain(doubt.at_share(share)), failed)
+            pareto = _backed_off(study, plain, doubt, failed)
         except InfeasibleError:
             # Before any point is simulated nothing is expected but the surfaces.
-            errors = doubt.expected if simulated else doubt.at_share(SHARES[-1])
+            errors = doubt.about_expected(0.0) if simulated else doubt.at_share(0.0)
             pareto = replace(plain(errors, closest=True), pick_reason=CLOSEST)
     pareto = replace(pareto, uncertainty=_uncertainty(study, pareto))
     if box is None or pareto.violations is not None:
         return pareto
     with named_faults(study, study.actual, " after manufacture"):
         try:
-            aware = _backed_off(
-                study, lambda share: _tolerance_aware(study, pareto, box, doubt.at_share(share)), failed
-            )
+            aware = _backed_off(study, partial(_tolerance_aware, study, pareto, box), doubt, failed)
         except InfeasibleError as error:
             return replace(pareto, tolerance_violations=error.violations)
     return replace(pareto, tolerance_aware=aware)
@@ -108,22 +108,26 @@ def with_survival(study: Problem, pareto: ParetoFront, confirmed: Mapping[str, C
     return replace(pareto, tolerance_aware=replace(aware, survival=shares))
 
 
-def _backed_off(study: Problem, search: Callable[[float], AnyFront], failed: int) -> AnyFront:
-    """The front with the largest share of the back-off that any point keeps. Raises InfeasibleError."""
+def _backed_off(study: Problem, search: Callable[[Doubt], AnyFront], doubt: "SurfaceDoubt", failed: int) -> AnyFront:
+    """The front with the largest share of the back-off that any point keeps, by the surfaces or else by the expected responses.
+
+    Raises InfeasibleError.
+    """
     if not study.goals.limited:
-        return search(0.0)
-    for share in (1.0 + failed, *SHARES)[failed == 0 :]:
+        return search(doubt.at_share(0.0))
+    shares = (1.0 + failed, *SHARES)[failed == 0 :]
+    ways = [(doubt.at_share, ""), (doubt.about_expected, ", corrected by the simulated points")][: 1 + doubt.corrected]
+    faults = []
+    for (errors, source), share in product(ways, shares):
         try:
-            searched = search(share)
-        except InfeasibleError:
-            if share == SHARES[-1]:
-                raise
+            searched = search(errors(share))
+        except InfeasibleError as fault:
+            faults.append(fault)
             continue
-        probability = study.file.confirmation.limit_probability
         margin = "the margin" if share >= 1.0 else f"{100.0 * share:g} % of the margin"
-        words = f"; limits keep {margin} for the required probability of {probability:g}"
-        return replace(searched, pick_reason=searched.pick_reason + words)
-    raise AssertionError("the last share either returns or raises")
+        words = f"; limits keep {margin} for the required probability of {study.file.confirmation.limit_probability:g}"
+        return replace(searched, pick_reason=searched.pick_reason + words + source)
+    raise faults[-1]
 
 
 def _uncertainty(study: Problem, pareto: ParetoFront) -> FrontUncertainty:
@@ -285,6 +289,8 @@ class SurfaceDoubt:
     def __init__(self, study: Problem, simulated: Sequence[Confirmed] = ()) -> None:
         self._surfaces, self._probability = study.surfaces, study.file.confirmation.limit_probability
         self._fields: dict[int, ErrorField] = {}
+        # Points outside the design's runs are known.
+        self.corrected = bool(simulated)
         # The error of one more simulation counts too.
         self._more: dict[int, float] = {}
         for index in sorted({index for index, _, _ in study.goals.limited}):
@@ -308,22 +314,29 @@ class SurfaceDoubt:
         """Range in which the responses lie with the study's probability, or a share of it."""
 
         def doubt(coded: Array) -> tuple[Array, Array]:
-            shift, margin = np.zeros((2, len(coded), len(self._surfaces)))
-            for index in self._fields:
-                quantile = float(special.stdtrit(self._surfaces[index].interval_dof, self._probability))
-                shift[:, index], deviation = self._off(index, coded)
-                margin[:, index] = quantile * deviation
+            shift, margin = self._shift_and_margin(coded)
             # The back-off never loosens a limit: the surface itself keeps it too.
             return share * (margin - shift).clip(0.0), share * (margin + shift).clip(0.0)
 
         return doubt
 
-    def expected(self, coded: Array) -> tuple[Array, Array]:
-        """The expected responses at coded points (n, k), as errors of the surfaces downwards and upwards (n, m)."""
-        shift = np.zeros((len(coded), len(self._surfaces)))
+    def about_expected(self, share: float) -> Doubt:
+        """The same about the expected responses, which may keep a limit that the surface exceeds."""
+
+        def doubt(coded: Array) -> tuple[Array, Array]:
+            shift, margin = self._shift_and_margin(coded)
+            return share * margin - shift, share * margin + shift
+
+        return doubt
+
+    def _shift_and_margin(self, coded: Array) -> tuple[Array, Array]:
+        """Expected responses less the surfaces (n, m) at coded points (n, k), and the margin for the study's probability."""
+        shift, margin = np.zeros((2, len(coded), len(self._surfaces)))
         for index in self._fields:
-            shift[:, index] = self._off(index, coded)[0]
-        return -shift, shift
+            quantile = float(special.stdtrit(self._surfaces[index].interval_dof, self._probability))
+            shift[:, index], deviation = self._off(index, coded)
+            margin[:, index] = quantile * deviation
+        return shift, margin
 
     def kept_with(self, index: int, sense: str, bound: float, coded: Array) -> float:
         """Probability with which a limited response keeps a bound ("<=" or ">=") at a coded point (k,)."""

@@ -176,8 +176,8 @@ LOST = 3
 class Selection(Record, eq=False):
     """The front with the pick, the pick of the searched front (None without a search), simulated points, and failures.
 
-    ``confirmed`` by name: "baseline", "pick", other picks, then "try_1" and so on for picks that did not keep their
-    limits. ``tries`` counts the points simulated as the pick.
+    ``confirmed`` by name: "baseline", "pick", other picks, then "try_1" and so on for picks that another one replaced.
+    ``tries`` counts the points simulated as the pick.
     """
 
     front: ParetoFront
@@ -193,9 +193,11 @@ def choose(
     """Simulate the pick; while a limit is not kept, back off by what was missed and simulate the next best point.
 
     Where no point is expected to keep all limits, that is the one expected to miss them least, as long as this is less than
-    simulated so far. If no point keeps all limits, the best of them is the pick. Raises RunError, InputError, KeyboardInterrupt.
+    simulated so far. If it keeps them after all, a front that knows this follows. If no point keeps all limits, the best of
+    them is the pick. Raises RunError, InputError, KeyboardInterrupt.
     """
     trials: list[tuple[Confirmed, ParetoFront, SearchedPick | None]] = []
+    kept: list[bool] = []
     front, lost = surface_front, 0
     while True:
         simulated = [baseline, *(point for point, _, _ in trials)] if trials else []
@@ -214,17 +216,24 @@ def choose(
             front = find_front(study, simulated, len(trials))
             continue
         trials.append((confirmed["pick"], front, candidate))
-        limits_kept = verdict_of(limits_of(study, confirmed["pick"])) == "kept"
-        if limits_kept or len(trials) == study.file.confirmation.tries:
+        kept.append(verdict_of(limits_of(study, confirmed["pick"])) == "kept")
+        # Where the closest point keeps its limits, so may points of a front.
+        is_closest = front.violations is not None and searched is None and kept[-1] and sum(kept) == 1
+        if len(trials) == study.file.confirmation.tries or (any(kept) and not is_closest):
             break
         if verdict_of(class_limits(study, confirmed["pick"])) != "kept":
             # No surface has a class: the front stays away from there.
             study = _without(study, points["pick"].point)
         if searched is None:
-            front = find_front(study, [baseline, *(point for point, _, _ in trials)], len(trials))
-            if front.violations is not None and not _promises_less(study, front, [point for point, _, _ in trials]):
+            front = find_front(study, [baseline, *(point for point, _, _ in trials)], kept.count(False))
+            if front.violations is not None and (
+                any(kept) or not _promises_less(study, front, [point for point, _, _ in trials])
+            ):
                 break
-    best = min(range(len(trials)), key=lambda place: _badness(limits_of(study, trials[place][0])))
+    # Of points that keep their limits the last one counts, which is of a front.
+    best = min(
+        range(len(trials)), key=lambda place: (-place * kept[place], *_badness(limits_of(study, trials[place][0])))
+    )
     pick, front, candidate = trials[best]
     points = choices(study, front, searched, candidate)
     for number, (point, _, _) in enumerate(trials, 1):

@@ -105,6 +105,10 @@ def test_a_limit_that_only_the_surfaces_miss_is_kept_by_simulation(tmp_path, mon
     (worse,) = shown.stderr.splitlines()
     assert worse.startswith("danger: the selected design is worse than the baseline: whirl deviation ratio ")
     assert record["obstacles"]["sentences"] == [] and record["limits"]["impact_force_N"]["verdict"] == "kept"
+    # The closest point keeps the limit, and so the surfaces, corrected by it, have a front of such points.
+    assert record["tried"] == 2 and "try_1" in record["confirmation"]
+    assert record["front"]["pick"]["reason"].endswith("corrected by the simulated points")
+    assert len(record["front"]["front"]) > 1
 
 
 def test_all_obstacles_are_named_at_once(tmp_path, monkeypatch):
