@@ -22,7 +22,7 @@ from rbdyn.base.faults import InputError, RunError, key_path
 from rbdyn.base.notes import Notes, merged
 from rbdyn.base.records import Record, finite
 from rbdyn.dynamics.figures import FIGURES
-from rbdyn.result import Quantity, SimulationResult, arrays_of
+from rbdyn.result import FrictionCheck, Quantity, SimulationResult, arrays_of
 from rbdyn.scene import Scene
 from rbdyn.scene.duty import AMBIENT, starting
 from rbdyn.verdict.orbits import CageVerdict
@@ -370,7 +370,7 @@ class DutyResult(Record):
         }
 
     @property
-    def friction_check(self) -> dict[str, float | None] | None:
+    def friction_check(self) -> FrictionCheck | None:
         """The maker's friction; None over several points, where it is that of none."""
         return self.points[self.groups[0][0]].friction_check if len(self.groups) == 1 else None
 

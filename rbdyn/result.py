@@ -397,6 +397,60 @@ class StartResult(Record, kw_only=True):
         return {key: part for key, part in found.items() if isinstance(part, Quantity)} | self.quantities
 
 
+class Film(Record):
+    """Oil film of a contact at its load, heating at its inlet included; ``lambda_ratio`` of the central film."""
+
+    central_film_um: float
+    minimum_film_um: float
+    lambda_ratio: float
+
+
+class RollerContact(Record):
+    """Contact of the most loaded roller with a race, and its film where the races roll."""
+
+    max_pressure_MPa: float  # noqa: N815
+    half_width_um: float
+    film: Film | None = spread(default=None)
+
+
+class PowerBalance(Record):
+    """Relative gap between power supplied and lost."""
+
+    relative_gap: float
+
+
+class LargestLoads(Record):
+    """Largest contact loads of a run."""
+
+    max_inner_N: float  # noqa: N815
+    max_outer_N: float  # noqa: N815
+    max_land_N: float  # noqa: N815
+
+
+class FrictionCheck(Record):
+    """A power loss against SKF's model and the heat of ISO 15312; ``ratio``: over SKF's power, None where that is zero."""
+
+    skf_power_W: float  # noqa: N815
+    skf_rolling_moment_N_mm: float  # noqa: N815
+    skf_sliding_moment_N_mm: float  # noqa: N815
+    iso_15312_heat_W: float  # noqa: N815
+    ratio: float | None
+
+
+class TargetRun(Record):
+    """Run to a target accuracy: its errors by figure, None where unknown, the choice that it made, and its cost."""
+
+    asked: float
+    met: bool
+    relative_error: dict[str, float | None]
+    rtol: float = keyed("chosen", "rtol")
+    turns: float = keyed("chosen", "turns")
+    replicates: int = keyed("chosen", "replicates")
+    runs: int
+    rhs_evaluations: int = keyed("cost", "rhs_evaluations")
+    pilot_rhs_evaluations: int = keyed("cost", "pilot_rhs_evaluations")
+
+
 class FigureOf:
     """A figure that every result has, as an attribute of its key."""
 
@@ -414,13 +468,11 @@ class SimulationResult(Brief, SavedRecord):
     - ``scene``: the resolved input
     - ``figures``: those of the whole bearing by key (``rbdyn.dynamics.figures``), which are attributes too
     - ``power_terms_W``: parts of the power loss; ``rolling_resistance_W``: the part of that name by race, "outer" and "inner"
-    - ``power_balance``: "relative_gap" between power supplied and lost; ``loads``: largest contact loads "max_inner_N",
-      "max_outer_N" and "max_land_N"
-    - ``races``: pressure, half-width and film at the largest load of "inner" and "outer"
+    - ``power_balance``: how it closes; ``loads``: largest contact loads
+    - ``races``: contacts at the largest load of "inner" and "outer"
     - ``clearance_um``: drawn and operating diametral clearance [um], with the changes by fits, temperature and rotation where a
       mounting is given. "radial", "guide" and "pocket" have the drawn, fit, temperature, rotation and operating share of each
-    - ``friction_check``: SKF's power [W] and moments [N mm], the heat of ISO 15312 [W] and the ratio of the power loss to SKF's.
-      None where the scene states no designation
+    - ``friction_check``: SKF's friction; None where the scene states no designation
     - ``transient_turns``: shaft turns from the start until the figures settled, None where the run does not show it
     - ``counted_turns``: turns counted of each replicate, more than asked for where it was lengthened
     - ``target``: choice, errors and cost of a run to a target accuracy, None for any other
@@ -438,19 +490,19 @@ class SimulationResult(Brief, SavedRecord):
     FORMAT = "rbdyn.simulation/5"
     WHAT = "simulation result"
     figures: dict[str, Quantity] = spread()
-    power_balance: dict[str, float]
-    loads: dict[str, float]
+    power_balance: PowerBalance
+    loads: LargestLoads
     notes: Notes
     power_terms_W: dict[str, float]  # noqa: N815
     rolling_resistance_W: dict[str, float]  # noqa: N815
     clearance_um: dict[str, Any]
-    friction_check: dict[str, float | None] | None
+    friction_check: FrictionCheck | None
     status: str
-    races: dict[str, dict[str, float]]
+    races: dict[str, RollerContact]
     impact_window_turns: float
     transient_turns: float | None
     counted_turns: float
-    target: dict[str, Any] | None
+    target: TargetRun | None
     cost: dict[str, float]
     replicates: int
     seed: int

@@ -30,6 +30,7 @@ from rbdyn.base.faults import InputError, RunError
 from rbdyn.base.files import digest_of, read_json
 from rbdyn.base.folder import free_lock, is_busy, is_locked, seize_lock
 from rbdyn.base.streams import Uninterrupted, escaped
+from rbdyn.base.words import shown
 
 T = TypeVar("T")
 
@@ -59,8 +60,8 @@ class StoppedError(RunError):
 class Cause(records.Record):
     """A cause of failures, with their runs, numbered from 1, and their labels."""
 
-    cause: str
-    runs: list[int]
+    cause: str = records.shown("cause")
+    runs: list[int] = records.shown("runs", cell=lambda failure: shown(failure.labels or failure.runs), text=True)
     labels: list[str]
 
 

@@ -23,7 +23,7 @@ from rbdyn.base.faults import RunError
 from rbdyn.base.notes import DANGER, Note, Notes, condensed, of_level
 from rbdyn.base.records import Record, derived, finite, keyed, outside_json, spread
 from rbdyn.base.words import chance, decimals, improvement, quantity, with_error
-from rbdyn.result import TEMPERATURES, Quantity, arrays_of
+from rbdyn.result import TEMPERATURES, FrictionCheck, Quantity, arrays_of
 from rbdyn.scene import Scene
 from rbdyn.scene.thermal import simulated_scene
 from rbdyn.verdict.orbits import CageVerdict
@@ -448,7 +448,7 @@ class ConfirmedPoint(Record, kw_only=True):
     limits: dict[str, Limit]
     every_limit: list[Limit]
     cage: dict[str, CageVerdict]
-    friction_check: dict[str, float | None] | None = None
+    friction_check: FrictionCheck | None = None
     temperatures_C: dict[str, EstimatedValue] | None = None  # noqa: N815
     thermal: Balance | None = None
     gains: dict[str, Gain] | None = None

@@ -20,7 +20,7 @@ from rbdyn.base.arrays import Array, one_thread
 from rbdyn.base.faults import InputError
 from rbdyn.base.records import Record, finite, keyed
 from rbdyn.base.words import chance
-from rbdyn.life import DutyLife
+from rbdyn.life import DutyLife, DutyLifeFigures
 from rbdyn.result import arrays_of
 from rbdyn.scene import Scene
 
@@ -68,25 +68,17 @@ class WorstPoint(Record):
         return f"{self.point} (probability {chance(self.probability)})"
 
 
-class LifeOverDuty(Record):
+class LifeOverDuty(DutyLifeFigures):
     """Life over the duty by static loads, with that at each point alone [h] and the damage there; None where it has no end."""
 
-    L10_h: float | None
-    L10_Mrev: float | None
-    equivalent_load_N: float | None  # noqa: N815
     point_hours: dict[str, float | None]
     damage: dict[str, float]
 
     @classmethod
     def of(cls, life: DutyLife, names: Sequence[str]) -> "LifeOverDuty":
         """The life of a bearing over the points of these names."""
-        return cls(
-            finite(life.hours),
-            finite(life.million_turns),
-            finite(life.equivalent_load),
-            dict(zip(names, map(finite, life.point_hours), strict=True)),
-            dict(zip(names, life.damage, strict=True)),
-        )
+        hours = dict(zip(names, map(finite, life.point_hours), strict=True))
+        return cls(**vars(life.figures), point_hours=hours, damage=dict(zip(names, life.damage, strict=True)))
 
 
 class DutyAnswer(Record):

@@ -104,7 +104,7 @@ def row_of(name: str, results: dict[str, SimulationResult], example_ms: float) -
         one, other = (result.quantities[figure] for result in results.values())
         scatter = math.hypot(one.statistical_error or 0.0, other.statistical_error or 0.0)
         apart.append(f"{(one.value - other.value) / scatter:+.1f}")
-    gaps = [f"{100.0 * result.power_balance['relative_gap']:.1g}" for result in results.values()]
+    gaps = [f"{100.0 * result.power_balance.relative_gap:.1g}" for result in results.values()]
     return [name, *prices, *evaluations, methods[1], *gaps, *apart]
 
 

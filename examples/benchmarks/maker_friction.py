@@ -55,7 +55,7 @@ def rows_of(results: dict[str, SimulationResult]) -> list[list[str]]:
     for name, result in results.items():
         check, loss, point = result.friction_check, result.power_loss_W, result.scene["operation"]
         assert check is not None
-        skf, heat, ratio = (check[key] for key in ("skf_power_W", "iso_15312_heat_W", "ratio"))
+        skf, heat, ratio = check.skf_power_W, check.iso_15312_heat_W, check.ratio
         assert skf and heat and ratio
         rest = sum(power for term, power in terms[name].items() if term not in shown)
         rows.append([
@@ -69,7 +69,7 @@ def rows_of(results: dict[str, SimulationResult]) -> list[list[str]]:
 
 def conclusion(results: dict[str, SimulationResult]) -> str:
     """Range and median over the bearings of the loss over SKF's, and of each term that makes it."""
-    every = [(result, result.friction_check["skf_power_W"]) for result in results.values() if result.friction_check]
+    every = [(result, result.friction_check.skf_power_W) for result in results.values() if result.friction_check]
     ratios = [result.power_loss_W.value / skf for result, skf in every if skf]
     terms = {
         term: [result.power_terms_W[term] / skf for result, skf in every if skf] for term in every[0][0].power_terms_W

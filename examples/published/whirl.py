@@ -71,7 +71,7 @@ def whirl(
             records.append({
                 "law": law, "fill": fill, "ratio": result.whirl_deviation_ratio.value,
                 "ratio_error": error(result.whirl_deviation_ratio), **moved,
-                "land_N": result.loads["max_land_N"], "impact_N": result.impact_force_N.value,
+                "land_N": result.loads.max_land_N, "impact_N": result.impact_force_N.value,
                 "impact_error": error(result.impact_force_N), "slip": result.cage_slip.value,
                 "regime": regime(moved["dry_share"], moved["contacts_per_turn"]),
             })  # fmt: skip

@@ -20,7 +20,7 @@ import numpy as np
 from rbdyn.accuracy.fixed_step import BudgetSpent, RightHandSide, runge_kutta_4, steps_of, velocity_of, velocity_verlet
 from rbdyn.accuracy.report import Progress, Report, Reporter, records, reported
 from rbdyn.base.arrays import Array, Whole
-from rbdyn.base.blocks import Column, Sheet, Table, columns_of
+from rbdyn.base.blocks import Column, Sheet, Table, columns_of, within
 from rbdyn.base.faults import InputError, RunError
 from rbdyn.base.records import Record, shown
 from rbdyn.dynamics.ensemble import Stop
@@ -246,8 +246,8 @@ class Error(Record):
     """Largest difference of two states: of any position of roller, cage or ring [m], and of any component over its
     scale (the approach or speed of a race contact)."""
 
-    position_m: float
-    scaled: float
+    position_m: float = shown("positions apart [m]", ".2g")
+    scaled: float = shown("worst component over its scale", ".2g")
 
 
 class Reference(Record):
@@ -326,12 +326,9 @@ def end_of(method: Method, stretch: Stretch, setting: float) -> Array:
 
 def agreement_table(references: Reference) -> Table:
     """How far the references are apart after each span."""
-    cells = [(f"{span:g}", f"{e.position_m:.2g}", f"{e.scaled:.2g}") for span, e in references.agreement.items()]
-    return Table(
-        f"the two references: {OURS.name} at {OUR_REFERENCE_RTOL:g}, {DOP853.name} at {THEIR_REFERENCE_RTOL:g}",
-        ("turns", "positions apart [m]", "worst component over its scale"),
-        cells,
-    )
+    title = f"the two references: {OURS.name} at {OUR_REFERENCE_RTOL:g}, {DOP853.name} at {THEIR_REFERENCE_RTOL:g}"
+    columns = Column[tuple[float, Error]]("turns", "g", at=0), *within(1, columns_of(Error))
+    return Sheet(title, columns, tuple(references.agreement.items())).block
 
 
 OK = "ok"

@@ -5,7 +5,7 @@ A duty is shown by its points with speed and load, and the life there and over t
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from rbdyn.base.blocks import Block, Column, Detail, Paragraph, Remarks, Sheet, Table, Verdict, with_notes
 from rbdyn.base.faults import RPM, key_path
@@ -14,14 +14,17 @@ from rbdyn.base.records import Record, finite, save_table
 from rbdyn.base.words import counted, error_alone, label, quantity, range_ends, shown, value_alone, with_error
 from rbdyn.clearances import DIFFERENCE, REPORTED, other_ranges
 from rbdyn.dynamics.figures import BEARING, DAMAGE, of_kind, repeated
-from rbdyn.life import PointLife, life_notes, life_sheet
+from rbdyn.life import DutyLifeFigures, PointLife, life_notes, life_sheet
 from rbdyn.properties.rexs import Attributes, write_rexs
 from rbdyn.result import (
+    FrictionCheck,
     GreatestValue,
     LeastClearance,
     Quantity,
+    RollerContact,
     SimulationResult,
     StartResult,
+    TargetRun,
     cage_column,
     figure_sheet,
     start_sheet,
@@ -116,6 +119,8 @@ def _write_rexs(scene: Scene, result: SimulationResult, folder: Path) -> str:
     speed_rpm = operation.inner_speed_rpm - operation.outer_speed_rpm
     torque = result.power_loss_W.value / abs(speed_rpm * RPM) if speed_rpm else None
     temperatures, stiffness = result.temperatures_C or {}, result.stiffness_N_um or {}
+    # A race without a load has none.
+    pressures = {race: contact.max_pressure_MPa for race, contact in result.races.items()}
     listed = catalogue_entry(bearing)
     sizes = listed[1] if listed else None
     nodes = {key: temperatures[node].value if node in temperatures else None for key, node in REXS_NODES.items()}
@@ -136,8 +141,8 @@ def _write_rexs(scene: Scene, result: SimulationResult, folder: Path) -> str:
         **{key: ("C", value) for key, value in nodes.items()},
         "total_frictional_power_loss": ("W", result.power_loss_W.value),
         "total_frictional_torque": ("N m", torque),
-        "maximum_hertzian_pressure_inner_ring": ("MPa", result.races["inner"]["max_pressure_MPa"]),
-        "maximum_hertzian_pressure_outer_ring": ("MPa", result.races["outer"]["max_pressure_MPa"]),
+        "maximum_hertzian_pressure_inner_ring": ("MPa", pressures.get("inner")),
+        "maximum_hertzian_pressure_outer_ring": ("MPa", pressures.get("outer")),
         "operating_point_stiffness_f_v_d_v": ("N / m", 1e6 * stiffness["xx"] if stiffness else None),
         "operating_point_stiffness_f_w_d_w": ("N / m", 1e6 * stiffness["yy"] if stiffness else None),
     }
@@ -172,20 +177,19 @@ def _error(error: float | None) -> str:
 
 def _run_sentence(result: SimulationResult) -> str:
     return (
-        f"raceway loads up to {result.loads['max_inner_N']:.0f} N (inner), {result.loads['max_outer_N']:.0f} N (outer); power "
-        f"balance closes to {100.0 * result.power_balance['relative_gap']:.2g} %; {counted(result.replicates, 'replicate')}, seed "
+        f"raceway loads up to {result.loads.max_inner_N:.0f} N (inner), {result.loads.max_outer_N:.0f} N (outer); power "
+        f"balance closes to {100.0 * result.power_balance.relative_gap:.2g} %; {counted(result.replicates, 'replicate')}, seed "
         f"{result.seed}; {result.cost['wall_s']:.2f} s, {result.cost['compile_s']:.1f} s to "
         "load or compile"
     )
 
 
-def _race_sentence(race: str, contact: dict[str, float]) -> str:
-    film = ""
-    if "lambda_ratio" in contact:
-        film = f", film {contact['central_film_um']:.2g} µm, lambda {contact['lambda_ratio']:.2g}"
+def _race_sentence(race: str, contact: RollerContact) -> str:
+    film = contact.film
+    oil = "" if film is None else f", film {film.central_film_um:.2g} µm, lambda {film.lambda_ratio:.2g}"
     return (
-        f"{race} raceway at its largest load: {contact['max_pressure_MPa']:.0f} MPa over {contact['half_width_um']:.0f} "
-        f"µm each way{film}"
+        f"{race} raceway at its largest load: {contact.max_pressure_MPa:.0f} MPa over {contact.half_width_um:.0f} "
+        f"µm each way{oil}"
     )
 
 
@@ -233,19 +237,10 @@ def start_blocks(start: StartResult | None) -> list[Block]:
     """Least clearances of a start with what the inputs leave open first, and how it goes; nothing without a start."""
     if start is None:
         return []
-    rows = list[tuple[str, ...]]()
-    for clearance in REPORTED:
-        name = f"{clearance.name}_um"
-        play: LeastClearance | None = getattr(start, name)
-        if play is not None:
-            rows.append(_start_row(start, clearance.words, name, play.least, play.time_s))
-    for words, name in (
-        ("largest axial load [N]", "axial_load_N"),
-        ("largest contact pressure [MPa]", "contact_pressure_MPa"),
-    ):
-        found: GreatestValue | None = getattr(start, name)
-        if found is not None:
-            rows.append(_start_row(start, words, name, found.greatest, found.time_s))
+    names = {clearance.words: f"{clearance.name}_um" for clearance in REPORTED}
+    names |= {"largest axial load [N]": "axial_load_N", "largest contact pressure [MPa]": "contact_pressure_MPa"}
+    found = ((words, name, getattr(start, name)) for words, name in names.items())
+    rows = [_start_row(start, words, name, extreme) for words, name, extreme in found if extreme is not None]
     header = ("start: least clearance [µm]", "value", "inputs (90 %)", "error (95 %)", "after [s] (inputs)")
     heat = "SKF's friction model at each moment"
     if start.moments:
@@ -254,12 +249,12 @@ def start_blocks(start: StartResult | None) -> list[Block]:
     return [Table("", header, rows), Paragraph(_start_sentence(start)), Paragraph(inputs, detail=Detail.ALL)]
 
 
-def _start_row(start: StartResult, words: str, name: str, extreme: Quantity, time: float | None) -> tuple[str, ...]:
+def _start_row(start: StartResult, words: str, name: str, found: LeastClearance | GreatestValue) -> tuple[str, ...]:
     """A figure of a start with its range and error, and when."""
-    spread = start.ranges[name]
+    spread, extreme = start.ranges[name], found.least if isinstance(found, LeastClearance) else found.greatest
     digits = 0.5 * (spread[-1] - spread[0]) or extreme.stated_error
     value = value_alone(extreme.value, digits)
-    return words, value, range_ends(spread), _error(extreme.stated_error), _when(start, name, extreme, time)
+    return words, value, range_ends(spread), _error(extreme.stated_error), _when(start, name, extreme, found.time_s)
 
 
 def _when(start: StartResult, name: str, extreme: Quantity, time: float | None) -> str:
@@ -348,14 +343,11 @@ def _inputs(result: SimulationResult) -> Table:
     return Table("Inputs", ("key", "value"), rows, text_columns=(1,), detail=Detail.ALL)
 
 
-def _friction_sentence(check: dict[str, float | None]) -> str:
-    """The maker's friction in a line; [N mm] and [W]."""
-    power, rolling, sliding, heat, ratio = check.values()
-    share = "no ratio at zero load or speed" if ratio is None else f"power loss is {ratio:.2f} of SKF's"
-    return (
-        f"friction by SKF's model {power:.3g} W (rolling {rolling:.3g}, sliding {sliding:.3g} N mm), ISO 15312 "
-        f"heat {heat:.3g} W; {share}"
-    )
+def _friction_sentence(check: FrictionCheck) -> str:
+    """The maker's friction in a line."""
+    share = "no ratio at zero load or speed" if check.ratio is None else f"power loss is {check.ratio:.2f} of SKF's"
+    moments = f"rolling {check.skf_rolling_moment_N_mm:.3g}, sliding {check.skf_sliding_moment_N_mm:.3g} N mm"
+    return f"friction by SKF's model {check.skf_power_W:.3g} W ({moments}), ISO 15312 heat {check.iso_15312_heat_W:.3g} W; {share}"
 
 
 def _losses(result: SimulationResult) -> list[Block]:
@@ -373,7 +365,7 @@ def _losses(result: SimulationResult) -> list[Block]:
         (f"rolling resistance, {race} raceway alone", shown(power, 3), f"{100.0 * power / total:.2g} %")
         for race, power in result.rolling_resistance_W.items()
     ]
-    gap = result.power_balance["relative_gap"] * result.power_loss_W.value
+    gap = result.power_balance.relative_gap * result.power_loss_W.value
     turns = result.transient_turns
     return [
         Paragraph("" if turns is None else f"transient: {counted(turns, 'shaft turn')}", detail=Detail.ALL),
@@ -381,15 +373,14 @@ def _losses(result: SimulationResult) -> list[Block]:
     ]
 
 
-def _target_sentence(target: dict[str, Any]) -> str:
-    choice, cost = target["chosen"], target["cost"]
-    errors = target["relative_error"].items()
+def _target_sentence(target: TargetRun) -> str:
+    errors = target.relative_error.items()
     reached = ", ".join(f"{label(name)} {'unknown' if e is None else f'{100.0 * e:.2g} %'}" for name, e in errors)
     return (
-        f"target {100.0 * target['asked']:g} % {'met' if target['met'] else 'not met'} ({reached}) by "
-        f"{counted(choice['replicates'], 'replicate')} of {counted(choice['turns'], 'turn')} at rtol "
-        f"{choice['rtol']:g}; {cost['rhs_evaluations'] / 1e6:.1f} million right-hand sides, "
-        f"{cost['pilot_rhs_evaluations'] / 1e6:.1f} of them for pilots; the seconds include pilots and all runs"
+        f"target {100.0 * target.asked:g} % {'met' if target.met else 'not met'} ({reached}) by "
+        f"{counted(target.replicates, 'replicate')} of {counted(target.turns, 'turn')} at rtol "
+        f"{target.rtol:g}; {target.rhs_evaluations / 1e6:.1f} million right-hand sides, "
+        f"{target.pilot_rhs_evaluations / 1e6:.1f} of them for pilots; the seconds include pilots and all runs"
     )
 
 
@@ -402,7 +393,7 @@ class MapDuty(Record):
     """Points of a duty, the life over it, and notes on what a map does not show of it."""
 
     points: tuple[PointLife, ...]
-    life: dict[str, float | None]
+    life: DutyLifeFigures
     notes: Notes
 
     @property
@@ -416,18 +407,18 @@ class MapDuty(Record):
         return duty_blocks(self.points, self.life)
 
 
-def duty_blocks(points: "Sequence[PointLife | SimulatedPoint]", life: Mapping[str, float | None]) -> list[Block]:
+def duty_blocks(points: "Sequence[PointLife | SimulatedPoint]", life: DutyLifeFigures | None) -> list[Block]:
     """Table of points with name, share, speed, load, life and share of the damage, and the life over the duty."""
     return [life_sheet(points).block, Paragraph(life_sentence(life))]
 
 
-def life_sentence(life: Mapping[str, float | None]) -> str:
+def life_sentence(life: DutyLifeFigures | None) -> str:
     """Life over a duty in words; empty where it has no end."""
-    if life.get("L10_h") is None:
+    if life is None or life.L10_h is None:
         return ""
     return (
-        f"Life over the duty, L10r: {shown(life['L10_h'], 3)} h (ISO/TS 16281 static loads, Palmgren and Miner); equivalent load "
-        f"{shown(life['equivalent_load_N'], 4)} N."
+        f"Life over the duty, L10r: {shown(life.L10_h, 3)} h (ISO/TS 16281 static loads, Palmgren and Miner); equivalent load "
+        f"{shown(life.equivalent_load_N, 4)} N."
     )
 
 
@@ -453,7 +444,7 @@ def map_duty(scene: Scene, path: Path, speeds_rpm: Sequence[float], loads_N: Seq
         *life_notes(life.hours, sum(point.share for point in stated)),
         *_notes(stated, scenes, speeds_rpm, loads_N),
     )
-    return MapDuty(points, life.as_record(), notes)
+    return MapDuty(points, life.figures, notes)
 
 
 def _notes(
@@ -489,7 +480,7 @@ def simulated_blocks(found: "DutySimulation") -> list[Block]:
         _point_table("Figures", found, SHOWN, cage_column()),
         _point_table("Clearances in operation [µm]", found, CLEARANCE_COLUMNS),
         Sheet("On the way to the points", STARTS, [point for point in found.points if point.start]).block,
-        *duty_blocks(found.points, found.life or {}),
+        *duty_blocks(found.points, found.life),
         Paragraph("" if found.life else f"Life over the duty: unknown, because {', '.join(lifeless)} has none."),
     ]
     return with_notes(found.notes, blocks)

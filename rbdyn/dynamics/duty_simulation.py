@@ -20,7 +20,7 @@ from rbdyn.dynamics.ensemble import Reporter, log, plan_of, threads_of
 from rbdyn.dynamics.figures import FIGURES
 from rbdyn.dynamics.part_figures import load_case
 from rbdyn.dynamics.simulate import simulate
-from rbdyn.life import ROLLER_EXPONENT, duty_life, life_notes, life_sheet
+from rbdyn.life import ROLLER_EXPONENT, DutyLifeFigures, duty_life, life_notes, life_sheet
 from rbdyn.result import (
     LeastClearance,
     Quantity,
@@ -95,7 +95,7 @@ class DutySimulation(OverPoints, SavedRecord, kw_only=True):
     status: str = derived(lambda self: self.count_failed())
     points: tuple[SimulatedPoint, ...]
     worst: dict[str, Worst]
-    life: dict[str, float | None] | None
+    life: DutyLifeFigures | None
     notes: Notes
     wall_s: float = keyed("cost", "wall_s")
     seed: int
@@ -180,7 +180,7 @@ def simulate_duty(
     return DutySimulation(
         points=points,
         worst=worst_of({point.name: point.figures for point in points if point.status == "ok"}),
-        life=None if life is None else life.as_record(),
+        life=None if life is None else life.figures,
         notes=(*short, *_notes(results)),
         wall_s=time.perf_counter() - started,
         seed=scene.numerics.seed,

@@ -14,6 +14,7 @@ import numpy as np
 
 from rbdyn.base.arrays import Array
 from rbdyn.base.faults import InputError, MethodError
+from rbdyn.base.records import plain
 from rbdyn.contact.hertz_line import iso_16281
 from rbdyn.dynamics.figures import PARTS, of_kind
 from rbdyn.dynamics.forces.state import INNER_LOAD, OUTER_LOAD
@@ -24,7 +25,7 @@ from rbdyn.dynamics.statistics.metrics import Runs
 from rbdyn.life import ROLLER_EXPONENT, DutyLife, LoadCase, duty_life, turning_rings
 from rbdyn.life.rollers import ReferenceLife, RollerContacts, Stiffness, reference_life, static_loads, static_stiffness
 from rbdyn.properties.materials import equivalent_modulus
-from rbdyn.result import Quantity
+from rbdyn.result import Quantity, RollerContact
 from rbdyn.scene import Scene
 from rbdyn.scene.thermal import Temperatures, at_temperatures
 
@@ -33,7 +34,7 @@ STIFFNESS = [figure.key for figure in of_kind("stiffness")]
 EXACT = [*(figure.key for figure in (*GAPS, LIFE)), *STIFFNESS]
 
 
-def races_of(scene: Scene, runs: Runs) -> dict[str, dict[str, float]]:
+def races_of(scene: Scene, runs: Runs) -> dict[str, RollerContact]:
     """``race_report`` at the largest loads of all runs."""
     return race_report(scene, *(max(run.largest_load(race) for run in runs) for race in (INNER_LOAD, OUTER_LOAD)))
 
@@ -44,7 +45,7 @@ def part_figures(scene: Scene, runs: Runs, figures: Mapping[str, Quantity]) -> d
     A clearance is exact for its scene, and so are life and stiffness, of which there are none without a load. The error of a contact follows from the scatter of the replicates' largest loads.
     """
     exact = {name: Quantity(value, 0.0, 0.0, float(len(runs))) for name, value in _exact(scene).items()}
-    races, reports = races_of(scene, runs), [races_of(scene, [run]) for run in runs]
+    races, *reports = (plain(races_of(scene, part)) for part in (runs, *([run] for run in runs)))
     contacts = {}
     for contact in CONTACTS:
         race, key = contact.source

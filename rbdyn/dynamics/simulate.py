@@ -28,7 +28,7 @@ from rbdyn.dynamics.statistics.extremes import return_force_notes
 from rbdyn.dynamics.statistics.metrics import TIGHT, whirl_notes, work_done
 from rbdyn.losses import POWER_TERMS
 from rbdyn.mounting.cage import OperatingClearance
-from rbdyn.result import SimulationResult
+from rbdyn.result import LargestLoads, PowerBalance, SimulationResult
 from rbdyn.scene import Scene, rollers_only
 from rbdyn.scene.thermal import point_before
 
@@ -143,7 +143,7 @@ def _gather(scene: Scene, ensemble: Ensemble, clock: dict[str, float]) -> Simula
     everything = [*runs, *companions]
     figures = quantities(scene, runs, companions, ensemble.plan.share, ensemble.since)
     power_gap = max(run.power_gap for run in runs)
-    loads = {"inner": INNER_LOAD, "outer": OUTER_LOAD, "land": LAND_LOAD}
+    loads = (max(run.largest_load(place) for run in runs) for place in (INNER_LOAD, OUTER_LOAD, LAND_LOAD))
     races = races_of(scene, runs)
     weights = [run.duration for run in runs]
     terms = {term: float(np.average([run.power(term) for run in runs], weights=weights)) for term in POWER_TERMS}
@@ -174,10 +174,10 @@ def _gather(scene: Scene, ensemble: Ensemble, clock: dict[str, float]) -> Simula
     return SimulationResult(
         status=status_of(notes),
         figures={figure.key: figures[figure.key] for figure in BEARING if figure.key in figures},
-        power_balance={"relative_gap": power_gap},
+        power_balance=PowerBalance(power_gap),
         power_terms_W=terms,
         rolling_resistance_W={"outer": terms["rolling_resistance"] - inner_rolling, "inner": inner_rolling},
-        loads={f"max_{name}_N": max(run.largest_load(place) for run in runs) for name, place in loads.items()},
+        loads=LargestLoads(*loads),
         races=races,
         clearance_um=clearance_report(scene),
         friction_check=maker,

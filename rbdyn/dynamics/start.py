@@ -455,7 +455,7 @@ def _race_pressure(machine: Machine, path: Path) -> tuple[float, float]:
         )
         loads = load_distribution(hot, bearing._replace(**dict(zip(("outer", "inner"), races, strict=True))), load)
         report = race_report(hot, float(loads.inner.max()), float(loads.outer.max()))
-        pressure = max((race["max_pressure_MPa"] for race in report.values()), default=0.0)
+        pressure = max((race.max_pressure_MPa for race in report.values()), default=0.0)
         found.append((pressure, 1e6 * hot.geometry.clearance))
     (pressure, play), (other, tighter) = found
     return pressure, abs((other - pressure) / (tighter - play)) if tighter != play else 0.0

@@ -30,7 +30,7 @@ from rbdyn.dynamics.statistics.batch_means import estimate
 from rbdyn.dynamics.statistics.error_bars import after_transient
 from rbdyn.dynamics.statistics.metrics import bias_scale, companion_tolerance, mean_gap, work_done
 from rbdyn.dynamics.statistics.replicate import Replicate
-from rbdyn.result import Quantity, SimulationResult
+from rbdyn.result import Quantity, SimulationResult, TargetRun
 from rbdyn.scene import Scene
 
 AIMED = {figure.key: figure.statistic for figure in FIGURES if figure.judged == "target" and figure.statistic}
@@ -144,17 +144,8 @@ def reach(
         met = all(error is not None and error <= target for error in errors.values())
         model = learned(model, scene, choice, result)
         shortest, longest = (min(factor * choice.turns * choice.replicates, MOST_TURNS) for factor in GROWTH)
-    record = {
-        "asked": target,
-        "met": met,
-        "relative_error": errors,
-        "chosen": {"rtol": choice.rtol, "turns": choice.turns, "replicates": choice.replicates},
-        "runs": runs,
-        "cost": {
-            "rhs_evaluations": int(spent["rhs_evaluations"]),
-            "pilot_rhs_evaluations": int(pilots["rhs_evaluations"]),
-        },
-    }
+    cost = (int(part["rhs_evaluations"]) for part in (spent, pilots))
+    record = TargetRun(target, met, errors, choice.rtol, choice.turns, choice.replicates, runs, *cost)
     notes = result.notes if met else (*result.notes, _shortfall(target, errors, result, choice))
     return replace(result, cost=result.cost | dict(spent), target=record, notes=notes)
 

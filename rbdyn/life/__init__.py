@@ -99,13 +99,18 @@ class DutyLife(Record):
     point_hours: tuple[float, ...]
     damage: tuple[float, ...]
 
-    def as_record(self) -> dict[str, float | None]:
-        """Life in hours and in turns, and the equivalent load, for a report; None for an infinite or unknown figure."""
-        return {
-            "L10_h": finite(self.hours),
-            "L10_Mrev": finite(self.million_turns),
-            "equivalent_load_N": finite(self.equivalent_load),
-        }
+    @property
+    def figures(self) -> "DutyLifeFigures":
+        """The life for a report."""
+        return DutyLifeFigures(finite(self.hours), finite(self.million_turns), finite(self.equivalent_load))
+
+
+class DutyLifeFigures(Record):
+    """Life over a duty in hours and in turns, and the equivalent load; None for an infinite or unknown figure."""
+
+    L10_h: float | None
+    L10_Mrev: float | None
+    equivalent_load_N: float | None  # noqa: N815
 
 
 class PointLife(Record):

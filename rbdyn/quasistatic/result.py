@@ -27,7 +27,7 @@ from rbdyn.quasistatic.row.ball import FixedShare, FrictionShare
 from rbdyn.quasistatic.row.equilibrium import INNER_ANGLE, INNER_LOAD, MOMENT, OUTER_ANGLE, OUTER_LOAD, PULL, Solution
 from rbdyn.quasistatic.row.model import RowModel
 from rbdyn.quasistatic.runout.turn import Runout
-from rbdyn.result import BallHeatBalance, ColdSeizure, SavedRecord, StartResult
+from rbdyn.result import BallHeatBalance, ColdSeizure, Film, SavedRecord, StartResult
 from rbdyn.scene.ball import BallRow, BallScene
 from rbdyn.scene.fits import Fits, race_film_temperature
 
@@ -238,12 +238,9 @@ class Ball(Record):
     gyroscopic_moment_Nmm: float = written("negative with the inner ring turning", unit="N mm")  # noqa: N815
 
 
-class Film(Record):
-    """Oil film of a contact at its load, the thermal factor included; ``lambda_ratio`` of the central film."""
+class BallFilm(Film):
+    """Oil film of a ball with its stiffness."""
 
-    central_film_um: float
-    minimum_film_um: float
-    lambda_ratio: float
     film_stiffness_N_per_um: float  # noqa: N815
 
 
@@ -259,7 +256,7 @@ class BallContact(Record, kw_only=True):
     area_mm2: float = derived(lambda self: math.pi * self.semi_major_mm * self.semi_minor_mm)
     edge_angle_deg: float | None = None
     shoulder_angle_deg: float
-    film: Film | None = spread(default=None)
+    film: BallFilm | None = spread(default=None)
 
 
 class Stiffness(Record):
@@ -502,7 +499,9 @@ def balls_of(figures: Array) -> list[Ball]:
     return [Ball(*values) for values in zip(*columns, strict=True)]
 
 
-def row_report(rating: Rating, solution: Solution, films: Mapping[Race, Film], reaction: RingLoad | None) -> RowReport:
+def row_report(
+    rating: Rating, solution: Solution, films: Mapping[Race, BallFilm], reaction: RingLoad | None
+) -> RowReport:
     """Report of one row; ``films``: of ``films_of``."""
     life = solution_life(solution, rating.capacities, turning_rings(*rating.speeds))
     return RowReport(
@@ -520,7 +519,7 @@ def row_report(rating: Rating, solution: Solution, films: Mapping[Race, Film], r
     )
 
 
-def _contact(rating: Rating, solution: Solution, race: Race, film: Film | None) -> BallContact:
+def _contact(rating: Rating, solution: Solution, race: Race, film: BallFilm | None) -> BallContact:
     load, edge = float(loads_on(solution, race).max()), float(edge_angles(solution, rating, race).max())
     contact, grown = rating.contact(race), load ** (1.0 / 3.0)
     return BallContact(
@@ -533,7 +532,7 @@ def _contact(rating: Rating, solution: Solution, race: Race, film: Film | None) 
     )
 
 
-def films_of(scene: BallScene, rating: Rating, solution: Solution, rings: tuple[str, str]) -> dict[Race, Film]:
+def films_of(scene: BallScene, rating: Rating, solution: Solution, rings: tuple[str, str]) -> dict[Race, BallFilm]:
     """Film of each race at its largest load; ``rings``: names of the inner and the outer ring.
 
     Empty for a scene without oil, and without races that have no load or no rolling speed.
@@ -543,7 +542,7 @@ def films_of(scene: BallScene, rating: Rating, solution: Solution, rings: tuple[
     lubricant, drawing = scene.lubricant, rating.drawing
     roughness = lubricant.roller_roughness, lubricant.race_roughness
     entrainment = point_contact.entrainment_speed(drawing.pitch_diameter, drawing.gamma, *rating.speeds)
-    films = dict[Race, Film]()
+    films = dict[Race, BallFilm]()
     for race, ring, side in zip(RACES, rings, (drawing.gamma, -drawing.gamma), strict=True):
         load = float(loads_on(solution, race).max())
         if entrainment == 0.0 or load == 0.0:
@@ -554,7 +553,7 @@ def films_of(scene: BallScene, rating: Rating, solution: Solution, rings: tuple[
         rolling = point_contact.RollingBall(rating.contact(race), radius, modulus, entrainment)
         heat = float(point_contact.thermal_factor(rolling, oil, load))
         central = float(point_contact.central_film(rolling, oil, load)) * heat
-        films[race] = Film(
+        films[race] = BallFilm(
             central_film_um=1e6 * central,
             minimum_film_um=1e6 * float(point_contact.minimum_film(rolling, oil, load)) * heat,
             lambda_ratio=float(lambda_ratio(central, *roughness)),

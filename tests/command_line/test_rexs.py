@@ -88,20 +88,16 @@ def test_what_cannot_be_read_is_a_sentence(tmp_path):
     assert in_process("rbdyn", "new", "NU210", "--bearing", "2").returncode == 2
 
 
+# A short run.
+SHORT = (
+    "--turns", "0.2", "--replicates", "1", "--set", "numerics.discard_turns=0", "--set", "numerics.companion=false",
+)  # fmt: skip
+
+
 def test_a_written_file_is_read_again(tmp_path):
     """Command line: what a simulation writes for REXS gives a scene of the same bearing at the same point."""
     scene = Path(__file__).parents[2] / "examples" / "cylindrical_roller.toml"
-    short = (
-        "--turns",
-        "0.2",
-        "--replicates",
-        "1",
-        "--set",
-        "numerics.discard_turns=0",
-        "--set",
-        "numerics.companion=false",
-    )
-    shown = in_process("rbdyn", "simulate", str(scene), *short, "--out", str(tmp_path / "run"), "-q")
+    shown = in_process("rbdyn", "simulate", str(scene), *SHORT, "--out", str(tmp_path / "run"), "-q")
     assert shown.returncode == 0 and "bearing.rexs" in shown.stdout
     again = in_process("rbdyn", "new", str(tmp_path / "run" / "bearing.rexs"))
     assert again.returncode == 0, again.stderr
@@ -110,6 +106,16 @@ def test_a_written_file_is_read_again(tmp_path):
         assert read["bearing"][key] == approx(getattr(before.bearing, key), rel=1e-9), key
     assert read["operation"]["inner_speed_rpm"] == 24000.0 and read["operation"]["radial_load_N"] == 1300.0
     assert read["lubricant"]["temperature_C"] == before.lubricant.temperature_C
+
+
+def test_a_raceway_without_a_load_is_written_without_a_pressure(tmp_path):
+    """Command line: rollers without a radial load press only on the outer raceway, thrown out by rotation."""
+    scene = Path(__file__).parents[2] / "examples" / "cylindrical_roller.toml"
+    idle = ("--set", "operation.radial_load_N=0")
+    shown = in_process("rbdyn", "simulate", str(scene), *SHORT, *idle, "--out", str(tmp_path / "run"), "-q")
+    assert shown.returncode == 0, shown.stderr
+    rexs = (tmp_path / "run" / "bearing.rexs").read_text()
+    assert "pressure_outer_ring" in rexs and "pressure_inner_ring" not in rexs
 
 
 def test_an_oil_of_no_known_grade_is_not_taken(tmp_path):

@@ -16,7 +16,7 @@ from typing import Any
 
 from rbdyn.base.faults import RunError
 from rbdyn.base.files import versions
-from rbdyn.result import Quantity, SimulationResult
+from rbdyn.result import LargestLoads, PowerBalance, Quantity, SimulationResult
 from rbdyn.scene import Scene
 
 
@@ -36,8 +36,8 @@ def instant_result(scene: Scene) -> SimulationResult:
         )
     }
     return SimulationResult(
-        status="ok", figures=figures, power_balance={"relative_gap": 0.0}, power_terms_W={}, rolling_resistance_W={},
-        loads={"max_inner_N": 1.0, "max_outer_N": 1.0, "max_land_N": 1.0}, races={}, clearance_um={}, friction_check=None, impact_window_turns=1.0, transient_turns=None, counted_turns=1.0, target=None, cost={},
+        status="ok", figures=figures, power_balance=PowerBalance(0.0), power_terms_W={}, rolling_resistance_W={},
+        loads=LargestLoads(1.0, 1.0, 1.0), races={}, clearance_um={}, friction_check=None, impact_window_turns=1.0, transient_turns=None, counted_turns=1.0, target=None, cost={},
         replicates=scene.numerics.replicates, seed=seed, notes=(), versions=versions(),
         scene=scene.model_dump(mode="json"),
     )  # fmt: skip

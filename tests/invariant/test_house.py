@@ -59,6 +59,8 @@ EDGES = {
     "rbdyn/quasistatic/preload.py": "makes scenes of a scene",
     "rbdyn/quasistatic/sweep.py": "is the saved record of the points",
     "rbdyn/dynamics/simulate.py": "saves the clearance as drawn",
+    "rbdyn/dynamics/start.py": "saves the pressure where the clearance is least",
+    "rbdyn/dynamics/parameters/validity.py": "speaks to people of the contacts saved",
     "rbdyn/dynamics/duty_simulation.py": "is the saved record of the points",
     "rbdyn/dynamics/slip_map.py": "is saved by the keys that it varies",
     "doe/dimension_chain/": "chains are in millimetres, as their drawings are",

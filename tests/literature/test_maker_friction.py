@@ -2,6 +2,7 @@
 
 import json
 import math
+from dataclasses import replace
 
 import pytest
 from conftest import ROOT
@@ -66,13 +67,12 @@ def test_literature_friction_check_at_the_reference_speed(bearing, make_scene):
     point = (f"operation.inner_speed_rpm={rpm}", f"operation.radial_load_N={float(load)}")
     scene = make_scene(f'bearing.designation="NU {size}"', "lubricant.supply=bath", *oil, *point)
     check = friction_check(scene, 2.5 * skf)
-    assert check is not None and check.keys() == KEYS
-    assert check["skf_power_W"] == pytest.approx(skf, rel=0.01) and check["iso_15312_heat_W"] == pytest.approx(
-        heat, abs=0.6
-    )
-    total = check["skf_rolling_moment_N_mm"] + check["skf_sliding_moment_N_mm"]
-    assert check["skf_power_W"] == pytest.approx(1e-3 * total * rpm * RPM)
-    assert check["ratio"] == pytest.approx(2.5 * skf / check["skf_power_W"])
+    assert check is not None and check.as_dict().keys() == KEYS
+    assert check.skf_power_W == pytest.approx(skf, rel=0.01)
+    assert check.iso_15312_heat_W == pytest.approx(heat, abs=0.6)
+    total = check.skf_rolling_moment_N_mm + check.skf_sliding_moment_N_mm
+    assert check.skf_power_W == pytest.approx(1e-3 * total * rpm * RPM)
+    assert check.ratio == pytest.approx(2.5 * skf / check.skf_power_W)
     (note,) = friction_notes(check)
     assert "2.5 times the" in note and "W of SKF's friction model, outside 0.5 to 2" in note
 
@@ -113,11 +113,11 @@ def test_unit_no_check_without_a_model(make_scene):
     schedule = "operation.schedule={time_s=[0.0, 1.0], radial_load_N=[100.0, 200.0]}"
     assert friction_check(make_scene(named, schedule), 100.0) is None
     idle = friction_check(make_scene(named, "operation.radial_load_N=0.0"), 100.0)
-    assert idle is not None and idle["ratio"] is None and idle["skf_power_W"] == 0.0 and friction_notes(idle) == ()
+    assert idle is not None and idle.ratio is None and idle.skf_power_W == 0.0 and friction_notes(idle) == ()
     usual = friction_check(make_scene(named), 100.0)
     assert usual is not None
     for ratio, notes in ((0.49, 1), (0.51, 0), (1.99, 0), (2.01, 1)):
-        assert len(friction_notes({**usual, "ratio": ratio})) == notes
+        assert len(friction_notes(replace(usual, ratio=ratio))) == notes
 
 
 @pytest.mark.parametrize(

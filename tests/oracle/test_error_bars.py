@@ -232,11 +232,11 @@ def test_run_to_a_target(outer):
     )
     result = simulate(scene, target=0.1)
     told = result.target
-    assert told["met"] and told["asked"] == 0.1
+    assert told.met and told.asked == 0.1
     for figure in (result.impact_force_N, result.whirl_deviation_ratio, result.power_loss_W):
         assert figure.error <= 0.1 * figure.value
-    assert told["chosen"]["replicates"] == result.replicates
-    assert 0 < told["cost"]["pilot_rhs_evaluations"] < told["cost"]["rhs_evaluations"]
+    assert told.replicates == result.replicates
+    assert 0 < told.pilot_rhs_evaluations < told.rhs_evaluations
     assert simulate(scene, workers=1, target=0.1).target == told
 
 

@@ -259,7 +259,7 @@ def test_unit_auto(make_scene, outer):
     assert auto.method == "rk43" and (plain.carry.y == auto.carry.y).all()
     steep = make_scene(*STEEPER)
     result = simulate(steep, workers=2)
-    assert result.cost["implicit_runs"] == 2 and result.power_balance["relative_gap"] < 0.005
+    assert result.cost["implicit_runs"] == 2 and result.power_balance.relative_gap < 0.005
     assert any("linearly implicit" in note for note in result.notes)
     explicit = make_scene(*STEEPER, "numerics.method=rk45", "numerics.turns=1", "numerics.discard_turns=0")
     held = simulate(explicit, workers=2)

@@ -46,7 +46,7 @@ def folder(tmp_path_factory) -> Path:
     result = {
         "format": SimulationResult.FORMAT, "status": "ok", **dict.fromkeys(names, quantity), "power_balance": {"relative_gap": 1e-3},
         "power_terms_W": {"drag": 2.0}, "rolling_resistance_W": {"outer": 1.0, "inner": 1.0}, "loads": {"max_inner_N": 1.0, "max_outer_N": 2.0, "max_land_N": 0.0},
-        "races": {"inner": {"pressure_MPa": 900.0}}, "clearance_um": {"drawn": 20.0}, "friction_check": None, "impact_window_turns": 1.0,
+        "races": {"inner": {"max_pressure_MPa": 900.0, "half_width_um": 90.0}}, "clearance_um": {"drawn": 20.0}, "friction_check": None, "impact_window_turns": 1.0,
         "transient_turns": None, "counted_turns": 2.0, "target": None, "cost": {"wall_s": 1.0}, "replicates": 2, "seed": 1,
         "notes": [{"level": "note", "code": "remark", "text": "none"}], "versions": {"rbdyn": "1"}, "scene": Scene.load(EXAMPLES / "cylindrical_roller.toml").model_dump(mode="json"),
     }  # fmt: skip

@@ -74,7 +74,7 @@ def ending(assignments):
         return "stopped", 0.0, ()
     figures = (result.impact_force_N, result.whirl_deviation_ratio, result.power_loss_W, result.cage_speed_rpm)
     assert all(math.isfinite(figure.value) for figure in figures)
-    return "done", result.power_balance["relative_gap"], result.notes
+    return "done", result.power_balance.relative_gap, result.notes
 
 
 @pytest.mark.slow

@@ -72,7 +72,7 @@ def test_limit_points_without_damage():
     assert half.equivalent_load == pytest.approx(1000.0 * 0.5 ** (1.0 / ROLLER_EXPONENT))
     still = duty_life([case(1.0, 0.0, 1000.0)], ROLLER_EXPONENT)
     assert math.isinf(still.hours) and math.isnan(still.equivalent_load) and still.damage == (0.0,)
-    assert still.as_record() == {"L10_h": None, "L10_Mrev": None, "equivalent_load_N": None}
+    assert still.figures.as_dict() == {"L10_h": None, "L10_Mrev": None, "equivalent_load_N": None}
     assert duty_life([case(1.0, 10.0, 0.0)], ROLLER_EXPONENT).equivalent_load == 0.0
 
 

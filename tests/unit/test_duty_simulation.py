@@ -53,7 +53,7 @@ def test_unit_each_point_is_its_own_simulation(scene, duty, found):
     alone = rbdyn.simulate(at_points[0], notice=None)
     assert found.points[0].figures == alone.responses
     life = roller_duty_life(at_points, [0.15, 0.8, 0.05])
-    assert found.life == life.as_record()
+    assert found.life == life.figures
     assert [point.L10_h for point in found.points] == pytest.approx(life.point_hours)
     assert [point.damage_share for point in found.points] == pytest.approx(life.damage)
 
@@ -77,7 +77,7 @@ def test_unit_a_life_below_the_hours_of_the_duty_is_a_danger(scene, duty, found,
     monkeypatch.setattr(duty_simulation, "simulate", unrun)
     points = read_duty(duty)
     total = sum(point.share for point in points)
-    for hours, short in ((1.0, False), (0.99 * found.life["L10_h"], False), (1.01 * found.life["L10_h"], True)):
+    for hours, short in ((1.0, False), (0.99 * found.life.L10_h, False), (1.01 * found.life.L10_h, True)):
         scaled = [point.model_copy(update={"share": point.share * hours / total}) for point in points]
         unsimulated = simulate_duty(scene, scaled, notice=None)
         assert ("short-life" in [note.code for note in unsimulated.notes]) == short

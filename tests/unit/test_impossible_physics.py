@@ -12,6 +12,7 @@ from rbdyn.contact.film_thickness import half_width
 from rbdyn.dynamics.parameters.model import rolling_contacts
 from rbdyn.dynamics.parameters.validity import heat_notes, race_notes, race_report
 from rbdyn.dynamics.simulate import simulate
+from rbdyn.result import Film, RollerContact
 from rbdyn.scene import Scene
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -108,20 +109,24 @@ def test_closed_form_a_load_that_flattens_a_roller(make_scene):
 
 def test_unit_races_tell_dents_and_thin_films(make_scene, outer):
     """Unit: a note from 4000 MPa on, and from lambda = 1 down unless the law knows of asperities or of no film."""
-    sound = {"max_pressure_MPa": 3999.0, "lambda_ratio": 1.01}
+
+    def contact(pressure: float = 3999.0, ratio: float = 1.01) -> RollerContact:
+        return RollerContact(pressure, 90.0, Film(0.2, 0.1, ratio))
+
+    sound = contact()
     assert race_notes(outer, {"inner": sound, "outer": sound}) == ()
-    (note,) = race_notes(outer, {"inner": sound, "outer": sound | {"max_pressure_MPa": 4001.0}})
+    (note,) = race_notes(outer, {"inner": sound, "outer": contact(4001.0)})
     assert note.startswith("outer raceway: dented by 4001 MPa, more than the 4000 MPa of ISO 76") and "rollers" in note
-    dents = [race_notes(outer, {"inner": {"max_pressure_MPa": pressure}})[0].code for pressure in (5311.0, 5313.0)]
+    dents = [race_notes(outer, {"inner": contact(pressure)})[0].code for pressure in (5311.0, 5313.0)]
     assert dents == ["dent", "overload"]
-    thin = {"inner": sound | {"lambda_ratio": 0.4}, "outer": sound | {"lambda_ratio": 0.3}}
+    thin = {"inner": contact(ratio=0.4), "outer": contact(ratio=0.3)}
     (note,) = race_notes(outer, thin)
     assert "lambda is 0.3 on the outer raceway" in note and "traction.friction = 'mixed'" in note
     mixed = ("traction.model=thermal_newtonian", "traction.friction=mixed")
     for changes in (mixed, ("traction.model=coulomb",), ("traction.model=off",)):
         assert race_notes(make_scene(*changes), thin) == ()
     assert race_notes(outer, race_report(outer, 730.0, 790.0)) == ()
-    assert race_notes(outer, {"inner": {"max_pressure_MPa": 1000.0}}) == ()
+    assert race_notes(outer, {"inner": RollerContact(1000.0, 90.0)}) == ()
 
 
 def test_unit_heat_that_no_oil_carries_off(outer):

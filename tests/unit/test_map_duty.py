@@ -87,7 +87,7 @@ def test_unit_blocks_state_the_life_over_the_duty(outer, path, mapped):
     duty = map_duty(outer, path, SPEEDS, LOADS)
     text = terminal_text(map_blocks(mapped, duty), width=200)
     assert "take-off" in text and "share of damage" in text
-    assert f"{duty.life['equivalent_load_N']:.1f} N" in text and "Life over the duty, L10r" in text
+    assert f"{duty.life.equivalent_load_N:.1f} N" in text and "Life over the duty, L10r" in text
 
 
 @pytest.mark.parametrize(
@@ -122,7 +122,7 @@ def test_unit_shares_are_normalised_on_request(outer, tmp_path):
         hours = hours.replace(f"share = {share}\n", f"share = {float(share) * 2000.0}\n")
     (tmp_path / "hours.toml").write_text(f"normalise_shares = true\n{hours}")
     of_hours, of_shares = (map_duty(outer, tmp_path / f"{name}.toml", SPEEDS, LOADS) for name in ("hours", "shares"))
-    assert of_hours.life["L10_h"] == pytest.approx(of_shares.life["L10_h"])
+    assert of_hours.life.L10_h == pytest.approx(of_shares.life.L10_h)
     assert [point.share for point in read_duty(tmp_path / "hours.toml")] == [500.0, 1400.0, 100.0]
     assert [point.share for point in of_hours.points] == pytest.approx([0.25, 0.7, 0.05])
 

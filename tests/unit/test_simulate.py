@@ -137,10 +137,10 @@ def test_unit_figures_of_the_shared_scene(outer_result):
     assert outer_result.impact_contact_force_N == outer_result.impact_force_N
     assert outer_result.power_loss_W.value == pytest.approx(238.07, abs=5.0 * 0.18)
     assert outer_result.cage_slip.value == pytest.approx(0.011614, abs=5.0 * 2e-5)
-    assert outer_result.power_balance["relative_gap"] < 1e-5
-    assert outer_result.loads["max_inner_N"] == pytest.approx(725.0, abs=5.0 * 4.1)
+    assert outer_result.power_balance.relative_gap < 1e-5
+    assert outer_result.loads.max_inner_N == pytest.approx(725.0, abs=5.0 * 4.1)
     # The centrifugal force of a roller.
-    assert outer_result.loads["max_outer_N"] - outer_result.loads["max_inner_N"] == pytest.approx(54.0, abs=0.3)
+    assert outer_result.loads.max_outer_N - outer_result.loads.max_inner_N == pytest.approx(54.0, abs=0.3)
 
 
 def test_unit_saved_result_comes_back(outer_result, tmp_path):

@@ -146,9 +146,9 @@ def test_oracle_race_pressure_where_clearance_is_least(cold):
     hot = at_temperatures(_scene(start={}), Temperatures(*nodes[:4]), tuple(nodes[4:]))
     loads = load_distribution(hot, roller_bearing(hot), 4000.0)
     races = race_report(hot, float(loads.inner.max()), float(loads.outer.max()))
-    pressure = max(race["max_pressure_MPa"] for race in races.values())
+    pressure = max(race.max_pressure_MPa for race in races.values())
     assert start.race_pressure_MPa == pytest.approx(pressure, rel=1e-4)
-    steady = max(cold.races[race]["max_pressure_MPa"] for race in ("inner", "outer"))
+    steady = max(cold.races[race].max_pressure_MPa for race in ("inner", "outer"))
     assert start.race_pressure_MPa < steady  # a smaller clearance spreads the load
     assert 0.0 < cold.responses["start_race_pressure_MPa"].error < 0.02 * pressure
 

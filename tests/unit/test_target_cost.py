@@ -33,7 +33,7 @@ def test_cost_of_a_run_to_a_target_is_that_of_pilots_and_all_runs(outer, monkeyp
     result = simulate(scene, workers=1, target=0.2)
     took = time.perf_counter() - started
     cost, last = result.cost, results[-1].cost
-    assert result.target["runs"] == len(results) >= 1 and len(runs) == len(LADDER) * PILOT_REPLICATES
+    assert result.target.runs == len(results) >= 1 and len(runs) == len(LADDER) * PILOT_REPLICATES
     sums = {
         "cpu_s": sum(run.cpu_s for run in runs),
         "steps": sum(run.accepted_steps for run in runs),
@@ -43,7 +43,7 @@ def test_cost_of_a_run_to_a_target_is_that_of_pilots_and_all_runs(outer, monkeyp
     }
     for key, pilots in sums.items():
         assert cost[key] == pytest.approx(pilots + sum(each.cost[key] for each in results)), key
-    assert cost["rhs_evaluations"] == result.target["cost"]["rhs_evaluations"] > last["rhs_evaluations"]
+    assert cost["rhs_evaluations"] == result.target.rhs_evaluations > last["rhs_evaluations"]
     assert cost["cpu_s"] <= cost["wall_s"] + cost["compile_s"] <= took
     assert cost["wall_s"] > sum(each.cost["wall_s"] for each in results) + 0.8 * sums["cpu_s"]
     assert set(cost) == set(last) and cost["eigenvalue_1_s"] == last["eigenvalue_1_s"]

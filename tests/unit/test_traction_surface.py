@@ -27,7 +27,8 @@ from rbdyn.contact.traction import (
     traction,
     traction_surface,
 )
-from rbdyn.dynamics.parameters.model import film_report, race_traction
+from rbdyn.dynamics.parameters.model import race_traction
+from rbdyn.dynamics.parameters.validity import race_report
 from rbdyn.properties.materials import oil_at
 from rbdyn.scene import Scene
 from rbdyn.scene.lubricant import RHEOLOGIES, smallest_traction
@@ -272,16 +273,14 @@ def test_unit_inputs_of_a_film_reach_the_law():
     assert starved.share_scale < smooth.share_scale
 
 
-def test_unit_film_report():
-    """Unit: film, Lambda and pressure of each race at a load; the outer film is the thicker; nothing if nothing rolls."""
-    report = film_report(scene(), 674.0, 674.0)
-    assert set(report) == {"outer", "inner"}
-    assert report["inner"]["hertz_pressure_Pa"] == pytest.approx(1.39e9, rel=5e-3)
-    assert 0.16e-6 < report["inner"]["central_film_m"] < report["outer"]["central_film_m"] < 0.24e-6
-    assert 2.3 < report["inner"]["lambda_ratio"] < report["outer"]["lambda_ratio"] < 3.1
-    for race in report.values():
-        assert race["minimum_film_m"] < race["central_film_m"]
-        assert 0.0 < race["asperity_share"] < 0.01
+def test_unit_race_report():
+    """Unit: film, Lambda and pressure of each race at a load; the outer film is the thicker; none if nothing rolls."""
+    report = race_report(scene(), 674.0, 674.0)
+    inner, outer = report["inner"].film, report["outer"].film
+    assert report["inner"].max_pressure_MPa == pytest.approx(1390.0, rel=5e-3)
+    assert 0.16 < inner.central_film_um < outer.central_film_um < 0.24
+    assert 2.3 < inner.lambda_ratio < outer.lambda_ratio < 3.1
+    assert inner.minimum_film_um < inner.central_film_um and outer.minimum_film_um < outer.central_film_um
 
 
 @pytest.mark.parametrize(

@@ -473,11 +473,11 @@ def power(summary: Summary) -> Section:
 
 def _maker(confirmed: Mapping[str, ConfirmedPoint]) -> list[str]:
     """A sentence on the friction by the maker's model, where the scene states a designation."""
-    checks = {name: point.friction_check or {} for name, point in confirmed.items()}
-    shares = [f"{name} {ratio:.2f}" for name, check in checks.items() if (ratio := check.get("ratio"))]
+    checks = {name: point.friction_check for name, point in confirmed.items() if point.friction_check}
+    shares = [f"{name} {check.ratio:.2f}" for name, check in checks.items() if check.ratio]
     if not shares:
         return []
-    power = next(check["skf_power_W"] for check in checks.values() if check)
+    power = next(iter(checks.values())).skf_power_W
     return [f"Power loss over the {power:.3g} W of SKF's friction model: {', '.join(shares)}."]
 
 

@@ -13,7 +13,7 @@ from doe.workflow.problem import Asked
 from doe.workflow.runs import StudyDesign, StudyRun
 from rbdyn.base.blocks import Block, Column, Detail, Figures, Paragraph, Section, Sheet, Table, columns_of
 from rbdyn.base.records import quoted_cell
-from rbdyn.base.words import counted, shown
+from rbdyn.base.words import counted
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -118,8 +118,7 @@ def _evaluation(evaluation: Evaluation) -> list[Block]:
 
 def failure_table(failures: Sequence[Cause]) -> Table:
     """Failures grouped by their cause."""
-    rows = [(failure.cause, shown(failure.labels or failure.runs)) for failure in failures]
-    return Table("What failed, by cause", ("cause", "runs"), rows, text_columns=(1,))
+    return Sheet("What failed, by cause", columns_of(Cause), failures).block
 
 
 def evaluation_plots(evaluation: Evaluation) -> list[Still]:
@@ -161,16 +160,14 @@ def coded_sheet(factors: Sequence[str], runs: Sequence[DesignRun]) -> Sheet[Desi
 def design_blocks(result: DesignResult) -> list[Block]:
     """Runs in actual values, in coded ones, and the quality of the design; at full detail also seeds and leverages."""
     evaluation, runs = result.evaluation, result.runs
-    seeds = [
-        (str(run.run), str(run.standard), str(run.seed), f"{leverage:.3f}")
-        for run, leverage in zip(runs, evaluation.leverage, strict=True)
-    ]
+    drawn = tuple(zip(runs, evaluation.leverage, strict=True))
+    order = *Column[Any]("{}", str, at=(0, "{}")).of(("run", "standard", "seed")), Column("leverage", ".3f", at=1)
     title = f"{result.kind.replace('_', ' ')}, {counted(len(runs), 'run')}"
     columns = (RUN, *([BLOCK] if result.is_blocked else []), *FACTOR.of(result.factors))
     return [
         Sheet(title, columns, runs).block,
         coded_sheet(result.factors, runs).block,
-        Table("Order, seeds and leverages", ("run", "standard", "seed", "leverage"), seeds, detail=Detail.ALL),
+        Sheet("Order, seeds and leverages", order, drawn, detail=Detail.ALL).block,
         *_evaluation_tables(evaluation),
     ]
 

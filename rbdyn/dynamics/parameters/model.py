@@ -26,6 +26,7 @@ from rbdyn.dynamics.forces.race_samples import NoRaceSamples, RaceSamples, RaceS
 from rbdyn.dynamics.forces.races import EqualRollers, Race, RoundRace, largest_rise, unequal_rollers, wavy_race
 from rbdyn.dynamics.parameters.state import contact_approach, layout_of, load_distribution
 from rbdyn.properties.materials import Oil, equivalent_modulus
+from rbdyn.result import Film
 from rbdyn.scene import Scene
 from rbdyn.scene.bearing import Harmonic
 from rbdyn.scene.lubricant import RHEOLOGIES
@@ -77,34 +78,14 @@ def rolling_contacts(scene: Scene) -> dict[str, film_thickness.RollingContact]:
     }
 
 
-def film_report(scene: Scene, inner_load: float, outer_load: float) -> dict[str, dict[str, float]]:
-    """Films at the loads [N] > 0 of an inner and an outer contact, in pure rolling at the nominal speed.
-
-    For each of "inner" and "outer": load_N, hertz_pressure_Pa, central_film_m and minimum_film_m (both with inlet
-    heating; the first with starvation where asked), thermal_factor, lambda_ratio (of the central film) and
-    asperity_share (what mixed friction would take). Empty where the races do not roll.
-    """
-    report = {}
-    for (race, contact), load in zip(rolling_contacts(scene).items(), (outer_load, inner_load), strict=True):
-        if contact.entrainment_speed == 0.0:
-            continue
-        oil = scene.oil(race)
-        factor = film_thickness.thermal_factor(contact, oil, load)
-        film = film_thickness.film_in_service(contact, oil, load, scene.lubricant.inlet_distance)
-        ratio = _lambda(scene, film)
-        values = {
-            "load_N": load,
-            "hertz_pressure_Pa": film_thickness.hertz_pressure(contact, load),
-            "central_film_m": film,
-            "minimum_film_m": factor * film_thickness.minimum_film(contact, oil, load),
-            "thermal_factor": factor,
-            "lambda_ratio": ratio,
-            "asperity_share": film_thickness.asperity_share(
-                ratio, scene.traction.asperity_b, scene.traction.asperity_c
-            ),
-        }
-        report[race] = {key: float(value) for key, value in values.items()}
-    return report
+def film_of(scene: Scene, race: str, contact: film_thickness.RollingContact, load: float) -> Film | None:
+    """Film of a contact at a load [N] > 0 in pure rolling at the nominal speed, starved where asked; None where races do not roll."""
+    if contact.entrainment_speed == 0.0:
+        return None
+    oil = scene.oil(race)
+    central = float(film_thickness.film_in_service(contact, oil, load, scene.lubricant.inlet_distance))
+    minimum = film_thickness.thermal_factor(contact, oil, load) * film_thickness.minimum_film(contact, oil, load)
+    return Film(central * 1e6, float(minimum) * 1e6, float(_lambda(scene, central)))
 
 
 def _load_independent(scene: Scene) -> Any:

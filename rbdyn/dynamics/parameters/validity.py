@@ -5,7 +5,7 @@ Each effect left out has the change that it would make and, where possible, an e
 
 import math
 from collections.abc import Callable, Mapping
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,10 +15,11 @@ from rbdyn.contact.film_thickness import half_width, hertz_pressure
 from rbdyn.contact.hertz_line import ROLLERS, palmgren, pressure_notes
 from rbdyn.contact.rolling_resistance import THINNEST_LAYER, inlet
 from rbdyn.dynamics.forces.bodies import AIR_DENSITY
-from rbdyn.dynamics.parameters.model import film_report, oil_layer, race_contact_law, rolling_contacts
+from rbdyn.dynamics.parameters.model import film_of, oil_layer, race_contact_law, rolling_contacts
 from rbdyn.life.friction import Running
 from rbdyn.life.rollers import REFERENCE_SPEED, SERIES, iso_15312_heat, minimum_loads, skf_moments, static_capacity
 from rbdyn.properties.materials import SOFTEST_METAL, equivalent_modulus
+from rbdyn.result import FrictionCheck, RollerContact
 from rbdyn.scene import Scene
 from rbdyn.scene.notes import catalogue_entry, clearance_notes, speed_notes
 from rbdyn.scene.unknown import documented_of
@@ -28,41 +29,27 @@ FULL_FILM = 1.0
 SMALLEST_LOAD = 1e-3  # [N]: a race with less counts as unloaded
 
 
-def race_report(scene: Scene, inner_load: float, outer_load: float) -> dict[str, dict[str, float]]:
-    """For "inner" and "outer", at the largest loads [N]: max_pressure_MPa, half_width_um, and three figures of the film.
+def race_report(scene: Scene, inner_load: float, outer_load: float) -> dict[str, RollerContact]:
+    """Contacts of "inner" and "outer" at the largest loads [N]; one without a load is missing.
 
-    These are central_film_um, minimum_film_um and lambda_ratio, missing where nothing rolls. A race without a load is missing
-    too. With a profile or a tilt the pressure is that of the most loaded slice, of a roller where the tilt is largest.
+    With a profile or a tilt the pressure is that of the most loaded slice, of a roller where the tilt is largest.
     """
-    loads = max(inner_load, SMALLEST_LOAD), max(outer_load, SMALLEST_LOAD)
-    films = film_report(scene, *loads)
-    count = scene.slices
-    contacts = rolling_contacts(scene)
-    report = {}
+    contacts, count, report = rolling_contacts(scene), scene.slices, dict[str, RollerContact]()
     for name, load in (("inner", inner_load), ("outer", outer_load)):
         if load < SMALLEST_LOAD:
             continue
-        line = contacts[name]
         most = load if count == 1 else _most_loaded_slice(scene, name, load)
-        contact = line._replace(length=line.length / count)
-        report[name] = {
-            "max_pressure_MPa": float(hertz_pressure(contact, most)) * 1e-6,
-            "half_width_um": float(half_width(contact, most)) * 1e6,
-        }
-        if name in films:
-            report[name] |= {
-                "central_film_um": films[name]["central_film_m"] * 1e6,
-                "minimum_film_um": films[name]["minimum_film_m"] * 1e6,
-                "lambda_ratio": films[name]["lambda_ratio"],
-            }
+        contact = contacts[name]._replace(length=contacts[name].length / count)
+        pressure, width = float(hertz_pressure(contact, most)) * 1e-6, float(half_width(contact, most)) * 1e6
+        report[name] = RollerContact(pressure, width, film_of(scene, name, contacts[name], load))
     return report
 
 
-def race_notes(scene: Scene, races: Mapping[str, Mapping[str, float]]) -> Notes:
+def race_notes(scene: Scene, races: Mapping[str, RollerContact]) -> Notes:
     """Notes where ``races`` of a report exceed their laws: dents, and films too thin for the friction of a full one."""
-    pressures = {name: 1e6 * race["max_pressure_MPa"] for name, race in races.items()}
+    pressures = {name: 1e6 * race.max_pressure_MPa for name, race in races.items()}
     notes = [note for name, most in pressures.items() for note in pressure_notes(most, ROLLERS, name)]
-    law, films = scene.traction, {name: race["lambda_ratio"] for name, race in races.items() if "lambda_ratio" in race}
+    law, films = scene.traction, {name: race.film.lambda_ratio for name, race in races.items() if race.film}
     thinnest = min(films, key=films.__getitem__, default=None)
     if thinnest and films[thinnest] < FULL_FILM and law.friction == "film" and law.model not in ("coulomb", "off"):
         sentence = (
@@ -87,7 +74,7 @@ def _most_loaded_slice(scene: Scene, race: str, load: float) -> float:
 USUAL_RATIO = (0.5, 2.0)
 
 
-def friction_check(scene: Scene, power_loss: float) -> dict[str, float | None] | None:
+def friction_check(scene: Scene, power_loss: float) -> FrictionCheck | None:
     """SKF's moments [N mm] and power, the heat of ISO 15312, and the simulated ``power_loss`` [W] over SKF's power.
 
     At the speed, load and oil of the scene; the load is the steady one in line with the rotating one. None without a
@@ -103,23 +90,17 @@ def friction_check(scene: Scene, power_loss: float) -> dict[str, float | None] |
     running = Running(*lengths, inner - outer, oil.viscosity / oil.density, scene.lubricant.supply)
     moments = skf_moments(named.series, running, load)
     power = sum(moments) * abs(inner - outer)
-    return {
-        "skf_power_W": power,
-        "skf_rolling_moment_N_mm": 1e3 * moments.rolling,
-        "skf_sliding_moment_N_mm": 1e3 * moments.sliding,
-        "iso_15312_heat_W": iso_15312_heat(sizes),
-        "ratio": power_loss / power if power > 0.0 else None,
-    }
+    ratio = power_loss / power if power > 0.0 else None
+    return FrictionCheck(power, 1e3 * moments.rolling, 1e3 * moments.sliding, iso_15312_heat(sizes), ratio)
 
 
-def friction_notes(check: dict[str, Any] | None) -> Notes:
+def friction_notes(check: FrictionCheck | None) -> Notes:
     """A note where the simulated power loss is far from SKF's."""
-    ratio = None if check is None else check["ratio"]
     low, high = USUAL_RATIO
-    if check is None or ratio is None or low <= ratio <= high:
+    if check is None or check.ratio is None or low <= check.ratio <= high:
         return ()
     sentence = (
-        f"power loss: it is {ratio:.2g} times the {check['skf_power_W']:.3g} W of SKF's friction model, outside {low:g} to {high:g}. "
+        f"power loss: it is {check.ratio:.2g} times the {check.skf_power_W:.3g} W of SKF's friction model, outside {low:g} to {high:g}. "
         "Compare the power terms, the oil and lubricant.supply"
     )
     return (Note("maker-loss", sentence),)
