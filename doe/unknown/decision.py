@@ -228,8 +228,8 @@ class _Gain(Record, eq=False):
 
     @cached_property
     def across(self) -> Array:
-        """Prior covariances (k, n) of fresh input sets with the rows."""
-        return self.emulator.prior(self.fresh, self.emulator.points)
+        """Prior covariances (n, k) of the rows with fresh input sets, those of a row side by side: resamplings take rows."""
+        return np.ascontiguousarray(self.emulator.prior(self.fresh, self.emulator.points).T)
 
     @cached_property
     def covariance(self) -> Array:
@@ -254,7 +254,7 @@ class _Gain(Record, eq=False):
         # Noise is no part of the true residuals.
         off = float((alone - self.emulator.hyperparameters.nugget if sharp else variances).mean())
         missed *= np.sqrt(max(variance - off, 0.0) / variance)
-        predictions = self.emulator.middle + self.across[:, rows] @ weights
+        predictions = self.emulator.middle + self.across[rows].T @ weights
         return mean + slope * (predictions - middle), missed
 
     @property
@@ -300,15 +300,22 @@ class _Slices(Record, eq=False):
 
         From each is subtracted the apparent gain of its first input when it is paired with the input that does nothing.
         """
-        size = self.coarse.shape[1] // PAIR_BINS
-        total, many = (
-            matrix.reshape(size, PAIR_BINS, size, PAIR_BINS).swapaxes(1, 2).reshape(size, size, -1)
-            for matrix in (self.coarse.T @ (self.coarse * better[:, None]), self.coarse.T @ self.coarse)
-        )
+        total, many = self._by_pairs(self.coarse * better[:, None]), self._counts
         both = _worths(np.where(many > 0.0, total / np.maximum(many, 1.0), p), p)
         chance = (both[:-1, -1] - worths).clip(0.0)
-        first, second = np.triu_indices(size - 1, 1)
+        first, second = np.triu_indices(len(both) - 1, 1)
         return np.asarray(both[first, second] - chance[first])
+
+    def _by_pairs(self, weights: Array) -> Array:
+        """Sums (i + 1, i + 1, cells) of weights (k, j) of the sets in the cells of each pair of inputs."""
+        size = self.coarse.shape[1] // PAIR_BINS
+        sums: Array = self.coarse.T @ weights
+        return sums.reshape(size, PAIR_BINS, size, PAIR_BINS).swapaxes(1, 2).reshape(size, size, -1)
+
+    @cached_property
+    def _counts(self) -> Array:
+        """Sets in the cells of each pair, the same for all resamplings."""
+        return self._by_pairs(self.coarse)
 
 
 class _Estimate(NamedTuple):
