@@ -51,7 +51,7 @@ def test_intervals_of_shares_cover() -> None:
         gains = noisy(0.5 + stats.norm.ppf(quantiles), 0.5, seed)
         share = gain_chances("a", gains.values, gains.smooth(quantiles), seed).gains["a"]
         held.append(share.low <= stats.norm.cdf(0.5) <= share.high)
-    assert np.mean(held) >= 0.9
+    assert 0.9 <= np.mean(held) <= 0.99  # nor are they too wide
 
 
 def test_a_design_that_always_wins_is_sure_within_its_rows() -> None:

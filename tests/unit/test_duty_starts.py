@@ -14,7 +14,14 @@ from rbdyn.scene.duty import duty_scenes, read_duty, starting
 from rbdyn.scene.thermal import point_before
 
 # Simulations of the heat alone: runs five times as long move no clearance by more than 0.03 um.
-QUICK = {"turns": 2.0, "discard_turns": 1.0, "impact_window_turns": 1.0, "replicates": 2, "extend": False, "companion": False}
+QUICK = {
+    "turns": 2.0,
+    "discard_turns": 1.0,
+    "impact_window_turns": 1.0,
+    "replicates": 2,
+    "extend": False,
+    "companion": False,
+}
 
 
 @pytest.fixture(scope="module")
