@@ -31,6 +31,8 @@ from rbdyn.base.words import counted
 from rbdyn.clearances import CLEARANCES
 
 if TYPE_CHECKING:
+    from doe.duty import Run, Simulated
+    from doe.running.store import Failure
     from doe.workflow.effort import Effort
     from doe.workflow.parts import ClearanceParts, Manufacture
     from doe.workflow.problem import Problem
@@ -59,8 +61,14 @@ CAGE_CLASS = "cage.verdict"
 WHIRL, IMPACT_POWER = "whirl_deviation_ratio", "pocket_impact_power_W"
 # Tolerance of design runs with elastic contacts: 13 to 22 % fewer right-hand sides than the default, and no bias that shows.
 DESIGN_RTOL = 0.04
-# What the run for the class of the cage has besides the settings of the study's runs; its replicates are as few as name a class.
-CAGE_RUN = ("numerics.discard_turns=10", "numerics.extend=false")
+# Turns that design runs discard, and those that they discard where a bearing forgets its start as fast as most do.
+DISCARDED, FEWER = 20, 7
+# Settings of short runs of the baseline beside those of the study's runs: of one as it is, whose replicates are as few as name a
+# class of the cage, and of one that counts the turns between. Impacts have windows that fit both.
+SHORT_RUN = ("numerics.extend=false", "numerics.impact_window_turns=4")
+BETWEEN = (*SHORT_RUN, f"numerics.discard_turns={FEWER}", f"numerics.turns={(DISCARDED - FEWER) // 4 * 4}")
+# Largest bias by fewer turns, over the error of six replicates: a third of the error of the four of a design run.
+SLIGHT_BIAS = 0.5
 HELD = """# Cage: held in a short run of the scene, so its whirl ratio means little and the impact power is a goal instead.
 # You can still name the whirl ratio: [[response]] with name = "whirl_deviation_ratio" and goal = "min".
 """
@@ -133,38 +141,47 @@ def new(
         points, hours = _duty(duty, scene)
         sections = {"responses": _responses(limits) + class_limit, "duty": points, "baseline": ""}
         factors = _factors(read_toml(path))
-        # A study finds its scene from its own folder.
-        base = path if out is None else Path(os.path.relpath(path.resolve(), out.resolve().parent))
-        values = {"quoted": json.dumps(str(base)), "hours": "true" if hours else None} | _tolerance(scene)
+        values = {"quoted": _quoted_path(path, out), "hours": "true" if hours else None}
 
-        def written(factors: list[Factor]) -> tuple[str, Problem]:
-            text = _template()
-            for name, section in {**_sections(scene, factors, tolerances, chains), **sections}.items():
-                text = text.replace(f"{{{name}}}", section)
-            text = fill_template(text, values)
+        def written(factors: list[Factor], discarded: int = DISCARDED) -> tuple[str, Problem]:
+            text = _filled(
+                _sections(scene, factors, tolerances, chains) | sections, values | _numerics(scene, discarded)
+            )
             file = validated(StudyFile, tomllib.loads(text), f"study of {path}")
             return text, Problem(out or Path("study.toml"), file)
 
         text, study = written(factors)
         check_goals(study)
-        effort = Effort(notice=notice(False))
-        with tempfile.TemporaryDirectory() as folder:
-            moved = region_that_runs(study, Path(folder), effort, kept=1.0).study
+        with tempfile.TemporaryDirectory() as temporary:
+            folder, effort = Path(temporary), Effort(notice=notice(False))
+            moved = region_that_runs(study, folder, effort, kept=1.0).study
             if moved is not study:
                 sections["baseline"], factors = _baseline(moved), _moved(factors, study, moved)
                 text, study = written(factors)
-            if {cage.name for cage in baseline_cages(study, Path(folder), effort).values()} == {"held"}:
+            cages = baseline_cages(study, folder, effort)
+            if {cage.name for cage in cages.values()} == {"held"}:
                 sections["responses"] = HELD + _responses(limits, {WHIRL: IMPACT_POWER}) + class_limit
                 text, study = written(factors)
+            if cages and settles_early(study, folder, effort):
+                text, study = written(factors, FEWER)
         check_study(study)
         hand_out(text, as_json, out, force, "doe study", reads)
 
 
-def _tolerance(scene: "Scene") -> dict[str, str | None]:
-    """What the template says of tolerances: a looser one of design runs, unless the scene has its own or may run implicitly."""
-    if not scene.traction.elasticity or "rtol" in scene.numerics.model_fields_set:
-        return {"looser": "", "rtol": None}
-    return {"looser": f', "numerics.rtol={DESIGN_RTOL}"', "rtol": str(scene.numerics.rtol)}
+def _quoted_path(path: Path, out: Path | None) -> str:
+    """Path of the scene in quotes, from the folder of the study ``out``, where it finds its scene."""
+    return json.dumps(str(path if out is None else os.path.relpath(path.resolve(), out.resolve().parent)))
+
+
+def _numerics(scene: "Scene", discarded: int) -> dict[str, str | None]:
+    """What the template says of the turns that design runs discard, and of their tolerance.
+
+    That is looser unless the scene has its own or may run implicitly. Confirmations keep the default of both.
+    """
+    looser, kept = "", [f"numerics.discard_turns={DISCARDED}"] * (discarded != DISCARDED)
+    if scene.traction.elasticity and "rtol" not in scene.numerics.model_fields_set:
+        looser, kept = f', "numerics.rtol={DESIGN_RTOL}"', [f"numerics.rtol={scene.numerics.rtol}", *kept]
+    return {"discarded": str(discarded), "looser": looser, "kept": json.dumps(kept) if kept else None}
 
 
 def baseline_cages(study: "Problem", folder: Path, effort: "Effort") -> "dict[str, CageVerdict]":
@@ -178,23 +195,61 @@ def baseline_cages(study: "Problem", folder: Path, effort: "Effort") -> "dict[st
     from rbdyn.dynamics.figures import why_missing
 
     check_study(study)
+    run = _short_run(study, SHORT_RUN)
+    if any(scene.cage_sample_s is None or why_missing(scene, IMPACT_POWER) for scene in scenes_of(run)):
+        return {}
+    (result,) = _baseline_results(study, [run], "the class of the cage", folder, effort)
+    return {} if isinstance(result, Failure) else cages_of(result)
+
+
+def settles_early(study: "Problem", folder: Path, effort: "Effort") -> bool:
+    """Whether fewer discarded turns hardly bias any response with a goal, by short runs of the baseline.
+
+    A heat balance takes place in the discarded turns, so that fewer save nothing there.
+    """
+    from doe.duty import scenes_of
+    from doe.running.store import Failure
+
+    run = _short_run(study, SHORT_RUN)
+    if (scene := scenes_of(run)[0]).thermal is not None:
+        return False
+    usual, between = _baseline_results(
+        study, [run, _short_run(study, BETWEEN, more=2)], "the turns to discard", folder, effort
+    )
+    if isinstance(usual, Failure) or isinstance(between, Failure):
+        return False
+    share = (DISCARDED - FEWER) / scene.numerics.turns
+    for place in study.goals.objectives:
+        figure, early = (result.responses[study.responses[place]] for result in (usual, between))
+        if share * abs(early.value - figure.value) > SLIGHT_BIAS * (figure.statistical_error or 0.0):
+            return False
+    return True
+
+
+def _short_run(study: "Problem", settings: Sequence[str], more: int = 1) -> "Run":
+    """A run of the baseline with as few replicates as name a class of the cage, or ``more`` times as many."""
 
     def scene(sets: Sequence[str]) -> "Scene":
         bare = study.scene_at(study.baseline, study.file.design.seed, sets, confirms=True)
-        effort = [f"numerics.replicates={bare.verdict.limits.fewest_replicates}", *CAGE_RUN]
+        effort = [f"numerics.replicates={more * bare.verdict.limits.fewest_replicates}", *settings]
         return study.scene_at(study.baseline, study.file.design.seed, [*sets, *effort], confirms=True)
 
-    run = study.over_duty(scene)
-    scenes = scenes_of(run)
-    if any(scene.cage_sample_s is None or why_missing(scene, IMPACT_POWER) for scene in scenes):
-        return {}
+    return study.over_duty(scene)
+
+
+def _baseline_results(
+    study: "Problem", runs: "Sequence[Run]", purpose: str, folder: Path, effort: "Effort"
+) -> "list[Simulated | Failure]":
+    """Results of short runs of the baseline; the notice hears of the last of them, as others are in the store."""
+    from doe.duty import scenes_of
+
     if effort.notice is not None:
+        scenes = scenes_of(runs[-1])
         numerics = scenes[0].numerics
         turns = numerics.replicates * (numerics.turns + numerics.warm_up_turns)
-        effort.notice(f"{counted(len(scenes), 'short run')} of {turns:g} shaft turns for the class of the cage")
+        effort.notice(f"{counted(len(scenes), 'short run')} of {turns:g} shaft turns for {purpose}")
     with effort.simulations(folder, study.path) as simulations:
-        (result,) = simulations.run([run], ["baseline"], simulations.progress("class of the cage"))
-    return {} if isinstance(result, Failure) else cages_of(result)
+        return simulations.run(runs, ["baseline"] * len(runs), simulations.progress("baseline"))
 
 
 def limits_of(texts: Sequence[str]) -> Limits:
@@ -281,6 +336,14 @@ def _sections(scene: "Scene", factors: list[Factor], tolerances: bool, chains: b
 def _template(part: str = "") -> str:
     """The template of a study, or a ``part`` of it."""
     return Path(__file__).with_name(f"new_study{part and '_'}{part}.toml").read_text(encoding="utf-8")
+
+
+def _filled(sections: Mapping[str, str], values: Mapping[str, str | None]) -> str:
+    """The template of a study with its sections and values."""
+    text = _template()
+    for name, section in sections.items():
+        text = text.replace(f"{{{name}}}", section)
+    return fill_template(text, values)
 
 
 def _chain_text(group: "ClearanceParts", manufacture: "Manufacture", derived: bool) -> str:

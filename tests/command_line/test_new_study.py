@@ -12,8 +12,9 @@ from doe_command import doe
 from short_studies import EXAMPLES
 
 from doe.clearance import responses_of
-from doe.commands.new import baseline_cages
+from doe.commands.new import baseline_cages, settles_early
 from doe.dimension_chain import chain_from, solve
+from doe.running.store import STORE, Failure, Store
 from doe.study_file.sections import StudyChain
 from doe.workflow.effort import Effort
 from doe.workflow.parts import clearance_parts, manufacture_of
@@ -21,6 +22,7 @@ from doe.workflow.problem import Problem
 from rbdyn.base.faults import InputError
 from rbdyn.base.tables.sheet import listed
 from rbdyn.properties.tolerances import grade_tolerances
+from rbdyn.result import Quantity
 from rbdyn.scene import Scene
 
 BASELINE_CAGES = baseline_cages
@@ -236,6 +238,7 @@ def test_command_line_goals_follow_the_class_of_the_cage(scene, monkeypatch, cla
     """Command line: impact power instead of the whirl ratio where the cage is held at every point, and a comment; a limit still names it."""
     found = {point: SimpleNamespace(name=name) for point, name in classes.items()}
     monkeypatch.setattr("doe.commands.new.baseline_cages", lambda *study: found)
+    monkeypatch.setattr("doe.commands.new.settles_early", lambda *study: False)
     text, study = written(scene)
     goals = [response["name"] for response in study["response"] if response["goal"] == "min"]
     assert goals == ["impact_force_N", goal, "power_loss_W"]
@@ -245,13 +248,62 @@ def test_command_line_goals_follow_the_class_of_the_cage(scene, monkeypatch, cla
     assert whirl["upper"] == 0.7 and whirl["goal"] == ("none" if words else "min")
 
 
-def test_unit_class_of_the_cage_of_a_baseline(scene, tmp_path):
-    """Unit: a short run at the baseline traces the cage with as few replicates as name a class; none where nothing traces it."""
+def test_command_line_design_runs_of_a_bearing_that_settles_early_discard_fewer_turns(scene, monkeypatch):
+    """Command line: 7 turns instead of 20, but confirmations discard 20; a cage that no short run traces keeps them."""
+    monkeypatch.setattr("doe.commands.new.settles_early", lambda *study: True)
+    _, untraced = written(scene)
+    monkeypatch.setattr(
+        "doe.commands.new.baseline_cages", lambda *study: {"operation": SimpleNamespace(name="circling")}
+    )
+    _, early = written(scene)
+    for study, turns, kept in ((untraced, 20, []), (early, 7, ["numerics.discard_turns=20"])):
+        assert f"numerics.discard_turns={turns}" in study["scene"]["set"]
+        assert study["confirmation"]["set"] == ["numerics.rtol=0.01", *kept]
+
+
+def test_unit_short_runs_of_a_baseline(scene, tmp_path):
+    """Unit: one traces the cage with as few replicates as name a class, and is stored for the next; none where nothing traces it."""
     (tmp_path / "study.toml").write_text(written(scene)[0], encoding="utf-8")
     study, heard = Problem.load(tmp_path / "study.toml"), list[str]()
-    (cage,) = BASELINE_CAGES(study, tmp_path, Effort(notice=lambda note: heard.append(str(note)))).values()
+    effort = Effort(notice=lambda note: heard.append(str(note)))
+    (cage,) = BASELINE_CAGES(study, tmp_path, effort).values()
     assert cage.name == "held" and cage.replicates == {"held": 6}
-    assert heard == ["1 short run of 300 shaft turns for the class of the cage"]
+    settles_early(study, tmp_path, effort)
+    assert heard == [
+        "1 short run of 360 shaft turns for the class of the cage",
+        "1 short run of 228 shaft turns for the turns to discard",
+    ]
+    with Store(tmp_path / STORE, "study") as store:
+        assert len(store.ended()) == 2
     untraced = replace(study, file=study.file.model_copy(deep=True), built={})
     untraced.scene.set.append("verdict.trace=false")
     assert BASELINE_CAGES(untraced, tmp_path, Effort()) == {}
+
+
+@pytest.mark.parametrize(
+    ("name", "early", "settles"),
+    [
+        ("power_loss_W", 102.9, True),
+        ("power_loss_W", 103.2, False),
+        ("impact_force_N", 96.8, False),
+        ("cage_slip", 1e3, True),
+    ],
+)
+def test_unit_a_bearing_settles_early_by_its_goals(scene, tmp_path, monkeypatch, name, early, settles):
+    """Unit: where 13 of 40 turns bias no goal by half of its error; not where a run failed, or its error is unknown, or it has heat."""
+    (tmp_path / "study.toml").write_text(written(scene)[0], encoding="utf-8")
+    study = Problem.load(tmp_path / "study.toml")
+    usual = dict.fromkeys([*study.responses, "cage_slip"], Quantity(100.0, 2.0, 0.0, 40.0))
+    between = usual | {name: Quantity(early, 2.0, 0.0, 40.0)}
+
+    def judged(*responses):
+        results = [each if isinstance(each, Failure) else SimpleNamespace(responses=each) for each in responses]
+        monkeypatch.setattr("doe.commands.new._baseline_results", lambda *study: results)
+        return settles_early(study, tmp_path, Effort())
+
+    assert judged(usual, between) == settles
+    assert not judged(usual, Failure("baseline", "stopped"))
+    unknown = usual | {"power_loss_W": Quantity(100.0, None, 0.0, 40.0)}
+    assert not judged(unknown, usual | {"power_loss_W": Quantity(100.1, None, 0.0, 40.0)})
+    study = Problem.load(EXAMPLES / "hot_clearance.toml")
+    assert not judged(usual, usual)
