@@ -120,17 +120,15 @@ def start_sheet(start: "StartResult | None" = None) -> Sheet[Mapping[str, float]
     columns = dict[str, list[float]]()
     if start is not None:
         path = start.path
-        columns = {name: path[name] for name in ("time_s", "speed_rpm", "load_N")}
-        columns |= {f"{node}_temperature_C": column for node, column in path["temperatures_C"].items()}
-        columns |= {f"{node}_heat_W": column for node, column in path["heat_W"].items()}
-        columns |= {name.replace("_um", "_clearance_um"): column for name, column in path["figures"].items()}
-        ends = dict(zip(("low", "high"), (0, 1), strict=True))
+        columns = {"time_s": path.time_s, "speed_rpm": path.speed_rpm, "load_N": path.load_N}
+        columns |= {f"{node}_temperature_C": column for node, column in path.temperatures_C.items()}
+        columns |= {f"{node}_heat_W": column for node, column in path.heat_W.items()}
+        plays = {name: name.replace("_um", "_clearance_um") for name in path.figures}
+        columns |= {key: path.figures[name] for name, key in plays.items()}
         columns |= {
-            f"{end}_{name.replace('_um', '_clearance_um') if name in path['figures'] else f'{name}_temperature_C'}": rows[
-                place
-            ]
-            for name, rows in path["ranges"].items()
-            for end, place in ends.items()
+            f"{end}_{plays.get(name, f'{name}_temperature_C')}": row
+            for name, rows in path.ranges.items()
+            for end, row in zip(("low", "high"), rows, strict=True)
         }
     listed = [Column[Mapping[str, float]](name) for name in columns] or [
         Column[Mapping[str, float]]("time_s", meaning="time from the start of the machine"),
@@ -334,6 +332,19 @@ class StartMoment(Record):
     power_loss_W: float  # noqa: N815
 
 
+class StartPath(Record):
+    """Columns over time: operating point, and by name temperatures, heat, conductances, figures, and both ends of ranges."""
+
+    time_s: list[float]
+    speed_rpm: list[float]
+    load_N: list[float]  # noqa: N815
+    temperatures_C: dict[str, list[float]]  # noqa: N815
+    heat_W: dict[str, list[float]]  # noqa: N815
+    conductances_W_K: dict[str, list[float]]  # noqa: N815
+    figures: dict[str, list[float]]
+    ranges: dict[str, tuple[list[float], ...]]
+
+
 class StartResult(Record, kw_only=True):
     """Start of a cold machine: least clearances, the lead of the inner ring, and temperatures over time.
 
@@ -345,7 +356,7 @@ class StartResult(Record, kw_only=True):
     - ``quantities``: figures of a roller bearing by ``START_FIGURES``, with errors
     - ``ranges``: 5, 50 and 95 % of figures over the ``inputs``, ``share_of_seizure`` of the input sets, and
       ``share_with_minimum`` of them by clearance; without a minimum its time is 0 or that to steady
-    - ``path``: columns over time; with the capacities they satisfy C dT/dt = heat - what the conductances carry off
+    - ``path``: with the capacities its columns satisfy C dT/dt = heat - what the conductances carry off
     """
 
     status: str
@@ -366,7 +377,7 @@ class StartResult(Record, kw_only=True):
     capacities_J_K: dict[str, float]  # noqa: N815
     boundaries_C: dict[str, float]  # noqa: N815
     moments: tuple[StartMoment, ...]
-    path: dict[str, Any]
+    path: StartPath
 
     @property
     def lost_clearance(self) -> Notes:

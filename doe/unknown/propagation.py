@@ -156,12 +156,19 @@ def emulated(runs: Runs, most: int | None = None, always: Sequence[int] = (), lo
     return Emulated(emulator, columns, logarithmic, float((smooth * unit).mean()), emulator.q2(), ceiling)
 
 
-def variance_by_cause(runs: Runs, fitted: Emulated) -> dict[str, float]:
-    """Shares of the variance of single runs by "simulation", "numerical" and "inputs"; 0 of the last where noise exceeds it."""
-    inputs = max(float(runs.values.var(ddof=1)) - fitted.noise - runs.numerical, 0.0)
-    variances = {"simulation": fitted.noise, "numerical": runs.numerical, "inputs": inputs}
-    total = sum(variances.values()) or 1.0
-    return {cause: variance / total for cause, variance in variances.items()}
+class VarianceShares(Record):
+    """Shares of the variance of single runs by cause; 0 of the inputs where noise exceeds it."""
+
+    simulation: float
+    numerical: float
+    inputs: float
+
+
+def variance_by_cause(runs: Runs, fitted: Emulated) -> VarianceShares:
+    """What causes the variance of single runs."""
+    variances = fitted.noise, runs.numerical, max(float(runs.values.var(ddof=1)) - fitted.noise - runs.numerical, 0.0)
+    total = sum(variances) or 1.0
+    return VarianceShares(*(variance / total for variance in variances))
 
 
 @one_thread

@@ -15,6 +15,7 @@ from doe.unknown.propagation import (
     Range,
     Runs,
     Share,
+    VarianceShares,
     emulated,
     explained,
     range_of,
@@ -66,7 +67,7 @@ class OutputRange(Record):
 
     nominal: Quantity = spread()
     input: Range
-    variance: dict[str, float]
+    variance: VarianceShares
     first: dict[str, Share] | None
     total: dict[str, Share] | None
     shapley: dict[str, Share] | None
@@ -80,7 +81,7 @@ class OutputRange(Record):
     @property
     def hidden(self) -> bool:
         """Whether simulation noise exceeds the effect of the inputs."""
-        return self.variance["inputs"] == 0.0
+        return self.variance.inputs == 0.0
 
     @property
     def shares(self) -> dict[str, Share]:
@@ -142,7 +143,7 @@ def find_uncertainty(
         case, sets = _varying(case, replicated_sets(case, joint.sets(count, seed), simulations, effort), idle)
         fitted = [_emulated(case, sets, nominal, place) for place in range(len(case.outputs))]
         ranges = [range_of(emulator, fresh_sets, seed) for _, emulator in fitted]
-        if effort < MOST_EFFORT and any(variance_by_cause(*pair)["simulation"] > NOISY for pair in fitted):
+        if effort < MOST_EFFORT and any(variance_by_cause(*pair).simulation > NOISY for pair in fitted):
             effort *= 2
         elif count < MOST and any(interval.relative_error > target for interval in ranges):
             count *= 2

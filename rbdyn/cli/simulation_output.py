@@ -260,7 +260,7 @@ def _start_row(start: StartResult, words: str, name: str, found: LeastClearance 
 def _when(start: StartResult, name: str, extreme: Quantity, time: float | None) -> str:
     """When a figure is extreme; times over the inputs, where these have any, and the share of these that have a minimum."""
     if time is None:
-        first, last = (abs(start.path["figures"][name][place] - extreme.value) for place in (0, -1))
+        first, last = (abs(start.path.figures[name][place] - extreme.value) for place in (0, -1))
         return "at the start" if first <= last else "at the end"
     times, share = start.ranges.get(f"{name}_time_s"), start.share_with_minimum.get(name)
     few = "" if share in (None, 1.0) else f"; a minimum in {100.0 * share:.0f} % of the input sets"

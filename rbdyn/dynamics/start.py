@@ -46,6 +46,7 @@ from rbdyn.result import (
     Quantity,
     SimulationResult,
     StartMoment,
+    StartPath,
     StartResult,
 )
 from rbdyn.scene import Scene, input_ranges
@@ -292,7 +293,7 @@ def _result(
         capacities_J_K=dict(zip(warming.WARMING_NODES, machine.capacities.tolist(), strict=True)),
         boundaries_C=machine.boundaries._asdict(),
         moments=tuple(_record(each) for each in simulated),
-        path=_columns(machine, law, path, simulated, ranges.bands),
+        path=StartPath(**_columns(machine, law, path, simulated, ranges.bands)),
     )
     return start, _notes(machine, start, distance)
 

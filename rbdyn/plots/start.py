@@ -28,19 +28,20 @@ SHOWN = 1.5
 def start(record: StartResult, path: Path) -> None:
     """Temperatures at the left, each clearance or load at the right with its extreme; lighter: 90 % over the inputs."""
     shown = {f"{clearance.name}_um": f"{clearance.name} clearance [µm]" for clearance in REPORTED} | OF_BALLS
-    names = [name for name in shown if name in record.path["figures"]]
+    names = [name for name in shown if name in record.path.figures]
     figure = blank((10.0, 6.5))
     grid = figure.add_gridspec(len(names), 2)
     left = figure.add_subplot(grid[:, 0])
-    times = np.array(record.path["time_s"])
+    times = np.array(record.path.time_s)
     end = times[-1] if record.time_to_steady_s is None else min(SHOWN * record.time_to_steady_s, times[-1])
     for node, (words, colour) in NODES.items():
         style = "-" if node in BANDED else "--"
         if node == "rollers" and record.contact_pressure_MPa is not None:
             words = "balls"
-        left.plot(times, record.path["temperatures_C"][node], style, color=colour, linewidth=1.6, label=words)
+        left.plot(times, record.path.temperatures_C[node], style, color=colour, linewidth=1.6, label=words)
         if node in BANDED:
-            left.fill_between(times, *record.path["ranges"][node], color=colour, alpha=0.12, linewidth=0.0)
+            low, high = record.path.ranges[node]
+            left.fill_between(times, low, high, color=colour, alpha=0.12, linewidth=0.0)
     left.legend(fontsize=9, loc="lower right", frameon=False)
     _over_time(left, "temperature [°C]", end)
     for row, name in enumerate(names):
@@ -51,9 +52,10 @@ def start(record: StartResult, path: Path) -> None:
 
 def _figure(axis: Axes, record: StartResult, name: str, words: str, end: float) -> None:
     """A figure over time; the least clearance, or the largest of another figure, is marked with its time."""
-    times, column = np.array(record.path["time_s"]), np.array(record.path["figures"][name])
-    if name in record.path["ranges"]:
-        axis.fill_between(times, *record.path["ranges"][name], color=BLUE, alpha=0.15, linewidth=0.0)
+    times, column = np.array(record.path.time_s), np.array(record.path.figures[name])
+    if name in record.path.ranges:
+        low, high = record.path.ranges[name]
+        axis.fill_between(times, low, high, color=BLUE, alpha=0.15, linewidth=0.0)
     axis.plot(times, column, color=BLUE, linewidth=1.6)
     row = int(column.argmax() if name in OF_BALLS else column.argmin())
     axis.plot(times[row], column[row], "o", color=BLUE, markersize=5)

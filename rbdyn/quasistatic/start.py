@@ -22,7 +22,7 @@ from rbdyn.life.friction import NO_AXIAL_LOAD
 from rbdyn.quasistatic.result import BallResult, Rating, pressures, reference_capacities
 from rbdyn.quasistatic.row.model import clearance_of
 from rbdyn.quasistatic.temperatures import Heat, heat_at, starvation_note, static_capacity_of, term_shares
-from rbdyn.result import GreatestValue, LeastClearance, Quantity, StartResult
+from rbdyn.result import GreatestValue, LeastClearance, Quantity, StartPath, StartResult
 from rbdyn.scene import input_ranges
 from rbdyn.scene.ball import SingleRowScene
 from rbdyn.scene.fits import mounted_of, row_change
@@ -206,6 +206,7 @@ def _start(scene: SingleRowScene, search: Search, ranged: bool) -> tuple[StartRe
     )
     conductances = np.array([here.around.warming for here in path.here])
     heat = np.array([warming.padded(here.heat.heat) for here in path.here])
+    columns = warming.columns(machine.course, path.rows, heat, conductances, path.figures, ranges.bands)
     start = StartResult(
         status=status,
         reason=reason or None,
@@ -221,7 +222,7 @@ def _start(scene: SingleRowScene, search: Search, ranged: bool) -> tuple[StartRe
         capacities_J_K=dict(zip(warming.WARMING_NODES, machine.capacities.tolist(), strict=True)),
         boundaries_C=search.last.run.boundaries._asdict(),
         moments=(),
-        path=warming.columns(machine.course, path.rows, heat, conductances, path.figures, ranges.bands),
+        path=StartPath(**columns),
     )
     return start, _notes(path, start)
 

@@ -7,7 +7,6 @@ equilibria (see ``light_load_share``), a start from the neighbour may end in ano
 """
 
 import itertools
-import json
 import math
 import re
 import time
@@ -25,7 +24,7 @@ from rbdyn.base.blocks import Column, Sheet
 from rbdyn.base.faults import InputError, number_list, refuse, validated
 from rbdyn.base.files import Checkpoint, code_version, run_key, versions
 from rbdyn.base.notes import Note, Notes
-from rbdyn.base.records import derived, finite, keyed, outside_json, save_table
+from rbdyn.base.records import Record, derived, finite, keyed, outside_json, save_table
 from rbdyn.base.words import counted
 from rbdyn.quasistatic.bearing import equilibrium
 from rbdyn.quasistatic.result import (
@@ -243,7 +242,7 @@ def _number(point: dict[str, Any], name: str) -> float:
     return float(value)
 
 
-class PointRecord(NamedTuple):
+class PointRecord(Record, eq=False):
     """One point: status, its figures, those of the balls by row, remarks and solutions of the rows.
 
     ``cold``: whether its start was not the point before.
@@ -255,24 +254,6 @@ class PointRecord(NamedTuple):
     remarks: list[Remark]
     rows: tuple[Solution, ...]
     cold: bool
-
-    def as_text(self) -> str:
-        """JSON, every number with all its digits."""
-        notes = [(word, note.code, note) for word, note in self.remarks]
-        return json.dumps(self._replace(remarks=notes), default=np.ndarray.tolist)  # type: ignore[arg-type]
-
-    @classmethod
-    def from_text(cls, text: str) -> Self:
-        """Inverse of ``as_text``."""
-        status, figures, balls, remarks, rows, cold = json.loads(text)
-        return cls(
-            status,
-            figures,
-            {name: np.array(values) for name, values in balls.items()},
-            [Remark(word, Note(code, sentence)) for word, code, sentence in remarks],
-            tuple(Solution._make(np.array(x) if isinstance(x, list) else x for x in row) for row in rows),
-            cold,
-        )
 
 
 def sweep(
@@ -328,12 +309,12 @@ def _walk(
     bearings = [scene for _, scene in points]
     solved: list[PointRecord] = []
     while row := store.get(f"{key} {len(solved)}"):
-        solved += map(PointRecord.from_text, row)
+        solved += map(PointRecord.from_dict, row)
     for place in range(len(solved), total):
         solved.append(_solve(bearings[place], solved[-1].rows if solved else ()))
         progress(place + 1, total)
         if store.path is not None and (place + 1) % ROW == 0:
-            store.put(f"{key} {place + 1 - ROW}", [point.as_text() for point in solved[-ROW:]])
+            store.put(f"{key} {place + 1 - ROW}", [point.as_dict() for point in solved[-ROW:]])
     return solved
 
 

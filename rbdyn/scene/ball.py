@@ -193,7 +193,7 @@ class MiddleRing(Strict):
     inner_oil_factor: Positive = 3.3
     """Palmgren's f0 of the inner row. Typical: 1.7 for oil mist, 2 for grease, 3.3 for an oil bath and 6.6 for an oil jet."""
     outer_oil_factor: Positive = 3.3
-    """Palmgren's f0 of the outer row."""
+    """Palmgren's f0 of the outer row. Use: rows with other oil supplies; friction of both sets the middle ring's speed."""
     tilt: Literal["free", "fixed"] | None = None
     """Whether the middle ring can tilt against the outer ring. Default: as operation.tilt."""
     axial_offset_mm: Annotated[float, Field(ge=-1000.0, le=1000.0)] = 0.0

@@ -246,7 +246,8 @@ class Numerics(Consistent, Sparse):
     """Repeat a share of the replicates at ten times the tolerance to estimate the numerical error. Where stability limits the
     steps of a slow bearing, they are repeated with steps that resolve its light contacts instead."""
     companion_share: Share = 0.25
-    """Share of the replicates that companion repeats."""
+    """Share of the replicates that companion repeats. Effect: with more of them the numerical error is better known and the
+    run takes longer."""
     stiffness: bool = True
     """Compute the stiffness by static loads after the runs: some 20 ms, nine times as long with a heat balance. A study
     computes it only if it names one of its results."""

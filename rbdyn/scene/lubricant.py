@@ -106,7 +106,7 @@ class Lubricant(Consistent, Sparse):
     oil_flow_l_min: 1e5 W^0.37/(n d_m^1.7) for a flow of W cm3/min, at most 0.15. The formula is unverified and meant for 1 to
     4 million n d_m."""
     oil_fraction_factor: Positive = 1.0
-    """Factor on the oil fraction calculated from oil_flow_l_min."""
+    """Factor on the oil fraction calculated from oil_flow_l_min. Use: a fraction known from a drag test of this supply."""
     roller_roughness_um: Annotated[float, Field(gt=0.0, le=100.0), NotVanishing] = 0.05
     """Root-mean-square roughness of the rollers. Typical: 0.03 to 0.1 for honed rollers of aircraft bearings. Effect: 0.05 on
     rollers and raceways gives Lambda = 2.4 to 2.9 in the bearing of Chen et al. 2022 at 100 C, and 0.1 gives 1.2 to 1.45."""

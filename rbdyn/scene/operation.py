@@ -68,7 +68,7 @@ class Operation(Consistent):
     """Acceleration of gravity, 9.81 where it matters. Default: off, because weights are small compared with centrifugal
     forces."""
     gravity_direction_deg: float = 0.0
-    """Direction of gravity, measured from the load."""
+    """Direction of gravity, measured from the load. Use: a gear or a belt loads the bearing, not the weight."""
     schedule: Schedule | None = None
     """Inner speed and radial load over time, instead of constant values."""
     unbalance, gravity_direction = SI("g_mm"), SI("deg")
@@ -276,7 +276,8 @@ class Mounting(Consistent, Sparse):
     outer_interference_um: float = 0.0
     """Diametral interference of outer ring and housing at the reference temperature; negative is a loose fit."""
     reference_temperature_C: Celsius = 20.0  # noqa: N815
-    """Temperature of the drawing, at which diameters, interferences and clearance hold."""
+    """Temperature of the drawing, at which diameters, interferences and clearance hold. Default: as ISO 1. Use: parts
+    measured at another temperature."""
     inner_ring_temperature_C: Celsius | None = None  # noqa: N815
     """Temperature of the inner ring. Default: the reference temperature."""
     outer_ring_temperature_C: Celsius | None = None  # noqa: N815

@@ -384,7 +384,7 @@ def columns(
         "heat_W": table(WARMING_NODES, heat),
         "conductances_W_K": table(WarmingConductances._fields, conductances),
         "figures": {name: short(column) for name, column in figures.items()},
-        "ranges": {name: [short(row) for row in band] for name, band in bands.items()},
+        "ranges": {name: tuple(short(row) for row in band) for name, band in bands.items()},
     }
 
 

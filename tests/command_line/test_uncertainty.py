@@ -436,7 +436,7 @@ def test_replicates_follow_the_share_of_noise(
     ran = dict(zip(simulations.seeds[1:], simulations.replicates[1:], strict=True))
     assert max(ran.values()) == max(most // 2, 2) and sum(ran.values()) == 64 * most
     share = error**2 / most / (error**2 / most + 25.0 / 12.0)
-    assert found.responses["impact_force_N"].variance["simulation"] == pytest.approx(share, rel=0.4, abs=0.01)
+    assert found.responses["impact_force_N"].variance.simulation == pytest.approx(share, rel=0.4, abs=0.01)
 
 
 def test_more_replicates_are_the_mean_of_all(tmp_path: Path) -> None:

@@ -9,14 +9,14 @@ from rbdyn.thermal.start import WARMING_NODES
 
 def stated(start: StartResult) -> np.ndarray:
     """Temperatures (6, rows) [C] of the JSON."""
-    return np.array([start.path["temperatures_C"][node] for node in WARMING_NODES])
+    return np.array([start.path.temperatures_C[node] for node in WARMING_NODES])
 
 
 def integrated(start: StartResult) -> np.ndarray:
     """The same by Radau."""
-    path, times = start.path, np.array(start.path["time_s"])
-    heat = np.array([path["heat_W"][node] for node in WARMING_NODES])
-    g = {name: np.array(column) for name, column in path["conductances_W_K"].items()}
+    path, times = start.path, np.array(start.path.time_s)
+    heat = np.array([path.heat_W[node] for node in WARMING_NODES])
+    g = {name: np.array(column) for name, column in path.conductances_W_K.items()}
     capacity = np.array([start.capacities_J_K[node] for node in WARMING_NODES])
     inlet, ambient = start.boundaries_C["inlet"], start.boundaries_C["ambient"]
     oil, outer, inner, rollers, housing, shaft = range(6)

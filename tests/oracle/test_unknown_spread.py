@@ -41,9 +41,9 @@ def test_variance_of_inputs_of_a_linear_function() -> None:
     runs = _noisy(lambda q: stats.norm.ppf(q[:, :2]) @ [3.0, 1.0], 3, 1024, np.sqrt(2.0), 1)
     fitted = emulated(runs)
     found, variance = range_of(fitted, nested(3, 8192, 2), 1), variance_by_cause(runs, fitted)
-    assert variance["inputs"] * runs.values.var(ddof=1) == pytest.approx(10.0, rel=0.06)
-    assert variance["simulation"] == pytest.approx(2.0 / 12.0, rel=0.1)
-    assert sum(variance.values()) == pytest.approx(1.0)
+    assert variance.inputs * runs.values.var(ddof=1) == pytest.approx(10.0, rel=0.06)
+    assert variance.simulation == pytest.approx(2.0 / 12.0, rel=0.1)
+    assert variance.simulation + variance.numerical + variance.inputs == pytest.approx(1.0)
     assert fitted.trusted
     assert [found.low, found.high] == pytest.approx(stats.norm.ppf([0.05, 0.95]) * np.sqrt(10.0), rel=0.05)
     assert found.median == pytest.approx(0.0, abs=0.2)
@@ -53,9 +53,9 @@ def test_noise_that_hides_the_inputs_is_said() -> None:
     runs = _noisy(lambda q: 0.01 * q[:, 0], 2, 64, 1.0, 3)
     fitted = emulated(runs)
     assert not fitted.trusted
-    assert variance_by_cause(runs, fitted)["inputs"] < 0.3
+    assert variance_by_cause(runs, fitted).inputs < 0.3
     none = Runs(runs.quantiles, runs.values, 4.0 * np.ones(64), runs.freedom)
-    assert variance_by_cause(none, emulated(none))["inputs"] == 0.0
+    assert variance_by_cause(none, emulated(none)).inputs == 0.0
 
 
 def test_untrusted_ranges_are_shrunk_by_their_noise() -> None:

@@ -56,9 +56,9 @@ def test_unit_end_of_the_course_is_the_steady_balance(cold):
     """Unit: the course begins cold and ends at the steady temperatures, clearance and axial load of the balance."""
     start, steady = cold.start, cold.thermal
     assert cold.status == "ok" and start.status == "steady" and start.reason is None
-    for node, column in list(start.path["temperatures_C"].items())[:4]:
+    for node, column in list(start.path.temperatures_C.items())[:4]:
         assert column[0] == 20.0 and column[-1] == pytest.approx(cold.temperatures_C[node], abs=0.1)
-    figures = start.path["figures"]
+    figures = start.path.figures
     assert figures["radial_um"][-1] == pytest.approx(steady.clearance_um["operating"], abs=0.1)
     assert figures["axial_load_N"][-1] == pytest.approx(steady.friction_loads_N["axial"], rel=5e-3)
     assert figures["contact_pressure_MPa"][-1] == pytest.approx(max(cold.max_stress_MPa.values()), rel=5e-3)
@@ -68,7 +68,7 @@ def test_unit_end_of_the_course_is_the_steady_balance(cold):
 
 def test_unit_fixed_preload_grows_while_the_inner_ring_leads(cold):
     """Unit: preload by a spacer follows the lead of the inner ring and outgrows its steady value; preload by a spring does not change."""
-    figures, start = cold.start.path["figures"], cold.start
+    figures, start = cold.start.path.figures, cold.start
     lead, axial = (np.array(figures[name]) for name in ("inner_minus_outer_K", "axial_load_N"))
     assert lead[0] == 0.0 and lead.max() > lead[-1] + 5.0
     assert axial.max() > 1.2 * axial[-1] > 1.2 * axial[0] and np.corrcoef(lead, axial)[0, 1] > 0.8
@@ -78,8 +78,8 @@ def test_unit_fixed_preload_grows_while_the_inner_ring_leads(cold):
     low, median, high = start.ranges["axial_load_N"]
     assert low < start.axial_load_N.greatest.value < high and low < median < high
     spring = rbdyn.equilibrium(_spindle({}, operation={"preload_um": None, "preload_N": 300.0}), ranges=False).start
-    assert set(spring.path["figures"]["axial_load_N"]) == {300.0} and spring.axial_load_N.time_s is None
-    assert spring.path["figures"]["radial_um"][0] > spring.radial_um.least.value + 5.0
+    assert set(spring.path.figures["axial_load_N"]) == {300.0} and spring.axial_load_N.time_s is None
+    assert spring.path.figures["radial_um"][0] > spring.radial_um.least.value + 5.0
 
 
 def test_oracle_course_of_balls_by_an_integration_of_its_own(cold):
@@ -92,11 +92,11 @@ def test_oracle_rows_are_equilibria_at_stated_temperatures(cold):
     """Oracle: each row has the clearance, axial load and pressure of the same bearing at its temperatures, stated in [mounting]."""
     scene, path = _example(thermal__start={}), cold.start.path
     for row in (0, 30, 60, -1):
-        nodes = np.array([path["temperatures_C"][node][row] for node in WARMING_NODES])
+        nodes = np.array([path.temperatures_C[node][row] for node in WARMING_NODES])
         hot = at_temperatures(scene, Temperatures(*nodes[:4].tolist()), tuple(nodes[4:].tolist()))
         assert hot.mounting.housing_temperature_C == nodes[4]
         stated = rbdyn.equilibrium(hot)
-        at_row = {name: column[row] for name, column in path["figures"].items()}
+        at_row = {name: column[row] for name, column in path.figures.items()}
         assert abs(stated.reaction.load_N["z"]) == pytest.approx(at_row["axial_load_N"], rel=1e-4)
         assert max(stated.max_stress_MPa.values()) == pytest.approx(at_row["contact_pressure_MPa"], rel=1e-4)
         assert float(radial_clearance(hot, scene.thermal, nodes)) == pytest.approx(at_row["radial_um"], abs=1e-3)
@@ -108,7 +108,7 @@ def test_oracle_spacing_and_first_guess_of_balls_do_not_matter(cold, monkeypatch
     monkeypatch.setattr("rbdyn.thermal.start.ROWS", 32.0)
     monkeypatch.setattr("rbdyn.thermal.start.TOLERANCE", 1e-8)
     other = rbdyn.equilibrium(_example(thermal__start={}, lubricant__temperature_C=45.0), ranges=False).start
-    assert len(other.path["time_s"]) > 1.8 * len(start.path["time_s"])
+    assert len(other.path.time_s) > 1.8 * len(start.path.time_s)
     for one, two in (
         (start.radial_um.least, other.radial_um.least),
         (start.temperature_difference_K, other.temperature_difference_K),
@@ -124,19 +124,19 @@ def test_unit_preload_that_runs_away_is_a_seizure_with_moment_and_cause():
     assert seized.status.startswith("no steady state") and seized.thermal.gain >= 1.0 and seized.report is None
     assert start.status == "seizure" and start.time_to_steady_s is None
     said = re.match(r"the preload runs away: from (\S+) s on the thermal loop gain is above 1", start.reason)
-    assert said is not None and 0.0 < float(said[1]) < (end := start.path["time_s"][-1])
+    assert said is not None and 0.0 < float(said[1]) < (end := start.path.time_s[-1])
     assert f"after {end:.3g} s a temperature passes what any oil bears" in start.reason
-    axial = np.array(start.path["figures"]["axial_load_N"])
-    assert (np.diff(axial)[5:] > 0.0).all() and start.path["temperatures_C"]["inner"][-1] >= 350.0
+    axial = np.array(start.path.figures["axial_load_N"])
+    assert (np.diff(axial)[5:] > 0.0).all() and start.path.temperatures_C["inner"][-1] >= 350.0
 
 
 def test_unit_schedule_of_balls():
     """Unit: a machine at rest has no heat; load over time is along its direction; a load that comes late comes late."""
     schedule = {"time_s": [0.0, 60.0, 120.0, 180.0], "speed_rpm": [0.0, 0.0, 4000.0, 8000.0]}
     start = rbdyn.equilibrium(_spindle({"from_C": 30.0, "schedule": schedule}), ranges=False).start
-    times, inner = np.array(start.path["time_s"]), np.array(start.path["temperatures_C"]["inner"])
+    times, inner = np.array(start.path.time_s), np.array(start.path.temperatures_C["inner"])
     assert (np.diff(inner[times <= 60.0]) <= 0.0).all() and inner[times > 120.0].max() > 40.0
-    assert not np.array(start.path["heat_W"]["inner"])[times <= 60.0].any() and start.status == "steady"
+    assert not np.array(start.path.heat_W["inner"])[times <= 60.0].any() and start.status == "steady"
     scene = _spindle({}, operation={"load_N": [300.0, 400.0, 50.0], "preload_um": None})
     moved = at_point(scene, 0.5 * scene.operation.inner_speed, 1000.0)
     assert moved.operation.load == (600.0, 800.0, 50.0) and moved.operation.inner_speed_rpm == 4000.0

@@ -103,7 +103,7 @@ def test_start_from_another_point_has_its_temperatures(scene):
     """The first row of a start from another operating point has the steady temperatures of that point, as a start from its parts."""
     slow = {"operation.inner_speed_rpm": 2000.0}
     found = simulate(scene.changed({"thermal.start": {"from_point": slow}}), workers=2, notice=None)
-    first = [column[0] for column in found.start.path["temperatures_C"].values()]
+    first = [column[0] for column in found.start.path.temperatures_C.values()]
     steady = simulate(scene.changed(slow), workers=2, notice=None).temperatures_C
     assert first[:4] == pytest.approx([steady[node].value for node in ("oil", "outer", "inner", "rollers")], abs=0.5)
     parts = simulate(scene.changed({"thermal.start": {"from_parts_C": first}}), workers=2, notice=None).start

@@ -77,14 +77,14 @@ def test_unit_least_clearance_of_nu_308(cold):
     steady = cold.clearance_um["radial"]["operating"]
     assert least + 3.0 < steady
     # The end of the course is the steady state of the balance, which the short runs of the course do not know.
-    assert start.path["figures"]["radial_um"][-1] == pytest.approx(steady, abs=0.2)
-    for node, column in list(start.path["temperatures_C"].items())[:4]:
+    assert start.path.figures["radial_um"][-1] == pytest.approx(steady, abs=0.2)
+    for node, column in list(start.path.temperatures_C.items())[:4]:
         assert column[0] == 20.0 and column[-1] == pytest.approx(cold.temperatures_C[node].value, abs=0.1)
     assert start.pocket_um.time_s is None  # the brass cage grows more than the rollers
     lead = start.temperature_difference_K.value
     assert lead > cold.temperatures_C["inner"].value - cold.temperatures_C["outer"].value + 2.0
     assert len(start.moments) <= 11 and start.moments[1].temperatures_C == dict.fromkeys(WARMING_NODES, 20.0)
-    assert {len(row) for rows in start.path["ranges"].values() for row in rows} == {len(start.path["time_s"])}
+    assert {len(row) for rows in start.path.ranges.values() for row in rows} == {len(start.path.time_s)}
     low, median, high = start.ranges["radial_um"]
     assert low < least < high and low < median < high
     assert start.time_to_steady_s == pytest.approx(1150.0, rel=0.15)
@@ -103,7 +103,7 @@ def test_oracle_course_by_an_integration_of_its_own(cold):
         nodes = rows[:, row]
         hot = at_temperatures(scene, Temperatures(*nodes[:4].tolist()), tuple(nodes[4:].tolist()))
         for name, play in hot.clearances.items():
-            assert path["figures"][f"{name}_um"][row] == pytest.approx(1e6 * play.operating, abs=1e-3)
+            assert path.figures[f"{name}_um"][row] == pytest.approx(1e6 * play.operating, abs=1e-3)
 
 
 def test_unit_figures_of_a_start_are_responses(cold):
@@ -148,8 +148,8 @@ def test_unit_study_names_a_start_as_the_json_does():
 def test_oracle_race_pressure_where_clearance_is_least(cold):
     """Oracle: the pressure is that of the bearing built anew at the temperatures of the moment, within the rows about it."""
     start, path = cold.start, cold.start.path
-    row = int(np.argmin(path["figures"]["radial_um"]))
-    nodes = [path["temperatures_C"][node][row] for node in WARMING_NODES]
+    row = int(np.argmin(path.figures["radial_um"]))
+    nodes = [path.temperatures_C[node][row] for node in WARMING_NODES]
     hot = at_temperatures(_scene(start={}), Temperatures(*nodes[:4]), tuple(nodes[4:]))
     loads = load_distribution(hot, roller_bearing(hot), 4000.0)
     races = race_report(hot, float(loads.inner.max()), float(loads.outer.max()))
@@ -175,7 +175,7 @@ def test_unit_widths_are_unknown_inputs():
 def test_unit_table_and_picture_of_a_start(cold, tmp_path):
     """Unit: start.csv has a row a moment with ranges about the course; the picture has a panel of temperatures and three of clearances."""
     frame = start_sheet(cold.start).frame
-    assert list(frame["time_s"]) == cold.start.path["time_s"]
+    assert list(frame["time_s"]) == cold.start.path.time_s
     assert frame["radial_clearance_um"].min() == pytest.approx(cold.start.radial_um.least.value, abs=0.05)
     assert (frame["low_radial_clearance_um"] <= frame["radial_clearance_um"] + 1e-6).all()
     assert (frame["low_inner_temperature_C"] <= frame["high_inner_temperature_C"]).all()
@@ -209,8 +209,8 @@ def test_slow_warm_up_keeps_more_clearance(cold):
     slow = simulate(_scene(start=ramp), workers=2, notice=None).start
     assert slow.radial_um.least.value > cold.start.radial_um.least.value + 1.0
     assert slow.temperature_difference_K.value < cold.start.temperature_difference_K.value
-    assert slow.path["figures"]["radial_um"][-1] == pytest.approx(cold.start.path["figures"]["radial_um"][-1], abs=0.3)
-    assert slow.path["speed_rpm"][0] == 800.0 and len(slow.moments) <= 11
+    assert slow.path.figures["radial_um"][-1] == pytest.approx(cold.start.path.figures["radial_um"][-1], abs=0.3)
+    assert slow.path.speed_rpm[0] == 800.0 and len(slow.moments) <= 11
 
 
 @pytest.mark.slow
@@ -222,8 +222,8 @@ def test_tight_cage_seizes_during_the_start():
     assert seized.status == start.status == "seizure" and "the guide clearance of the cage is lost" in start.reason
     assert "by half of the simulations after" in start.reason and not any("failed" in note for note in seized.notes)
     floor = 2.0 * _scene().model.land_film_floor_um
-    guide = start.path["figures"]["guide_um"]
-    assert guide[-1] <= floor + 1e-6 < guide[-2] and start.path["time_s"][-1] < 60.0
+    guide = start.path.figures["guide_um"]
+    assert guide[-1] <= floor + 1e-6 < guide[-2] and start.path.time_s[-1] < 60.0
     assert start.time_to_steady_s is None and start.share_of_seizure > 0.5
     assert seized.notes[0].startswith("seizure: start: after") and seized.notes[0].code == "seizure"
 

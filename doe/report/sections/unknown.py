@@ -30,11 +30,11 @@ RANGES: tuple[Column[OutputRange], ...] = (
         "simulation_percent",
         ".1f",
         "simulation",
-        at=lambda output: 100.0 * output.variance["simulation"],
+        at=lambda output: 100.0 * output.variance.simulation,
         meaning="share of the variance of a single run by cause",
     ),
-    Column("numerical_percent", ".1f", "integration", at=lambda output: 100.0 * output.variance["numerical"]),
-    Column("inputs_percent", ".1f", "inputs", at=lambda output: 100.0 * output.variance["inputs"]),
+    Column("numerical_percent", ".1f", "integration", at=lambda output: 100.0 * output.variance.numerical),
+    Column("inputs_percent", ".1f", "inputs", at=lambda output: 100.0 * output.variance.inputs),
 )
 
 
