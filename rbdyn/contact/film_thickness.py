@@ -104,12 +104,3 @@ def lightest_load(contact: RollingContact, oil: Oil) -> float:
 def lambda_ratio(film: Any, first_roughness: float, second_roughness: float) -> Any:
     """Film over composite roughness, h/sqrt(s_1^2 + s_2^2), from rms roughnesses [m] of which one is > 0."""
     return film / math.hypot(first_roughness, second_roughness)
-
-
-def asperity_share(ratio: Any, b: float, c: float) -> Any:
-    """Share of the load that asperities carry, exp(-b Lambda^c) (Zhou and Hoeprich 1991, eq 29).
-
-    ``b`` and ``c`` depend on the pair of surfaces: 2.32 and 0.97 for the raceways of a tapered roller bearing with a
-    composite roughness of 0.16 um, 1.90 and 0.99 for its rib (Lubricants 11, 2023, 369, Table 4).
-    """
-    return np.exp(-b * np.asarray(ratio) ** c)

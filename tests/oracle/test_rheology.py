@@ -8,8 +8,6 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from four_constants import fit_four_constants
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from scipy.integrate import quad
 from scipy.special import iv, modstruve
 
@@ -162,15 +160,6 @@ def test_unit_lightest_load_is_where_two_films_meet():
         load = films.lightest_load(INNER, oil)
         rigid = 4.9 * oil.viscosity * INNER.entrainment_speed * INNER.radius * INNER.length / load
         assert films.central_film(INNER, oil, load) == pytest.approx(rigid, rel=1e-10)
-
-
-@given(ratio=st.floats(0.0, 20.0), b=st.floats(0.1, 5.0), c=st.floats(0.2, 3.0))
-@settings(max_examples=100, deadline=None)
-def test_invariant_asperity_share(ratio, b, c):
-    """Invariant: all of the load without a film, less the thicker it is, never outside 0 to 1."""
-    share = float(films.asperity_share(ratio, b, c))
-    assert 0.0 <= float(films.asperity_share(ratio + 0.1, b, c)) <= share <= 1.0
-    assert films.asperity_share(0.0, b, c) == 1.0
 
 
 def closed_form_slope(viscosity, alpha, load, film):
