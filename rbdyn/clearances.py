@@ -9,7 +9,7 @@ from rbdyn.base.words import range_ends
 class Clearance(NamedTuple):
     """A clearance: its name, the key of a scene with its value on the drawing, and what it lies between.
 
-    ``step``: of a study, as a share of its value: the axial runs of a rotatable design lie 1.7 steps out, and none may touch zero.
+    ``step``: of a study, as a share of its value: axial runs lie 1.2 to 1.4 steps out, and none may touch zero.
     ``words``: those of its changes in operation; empty for one whose changes no result reports.
     """
 
@@ -21,12 +21,12 @@ class Clearance(NamedTuple):
 
 
 CLEARANCES = (
-    Clearance("radial", "bearing.radial_clearance_mm", "diametral in the bearing", 0.25, "clearance"),
-    Clearance("guide", "cage.guide_clearance_mm", "diametral between cage and guide", 0.3, "guide clearance"),
+    Clearance("radial", "bearing.radial_clearance_mm", "diametral in the bearing", 0.32, "clearance"),
+    Clearance("guide", "cage.guide_clearance_mm", "diametral between cage and guide", 0.38, "guide clearance"),
     Clearance(
-        "pocket", "cage.pocket_clearance_mm", "width of the pocket less the roller diameter", 0.2, "pocket clearance"
+        "pocket", "cage.pocket_clearance_mm", "width of the pocket less the roller diameter", 0.25, "pocket clearance"
     ),
-    Clearance("lip", "cage.pocket_radial_clearance_mm", "radial at the lips of the pocket", 0.25),
+    Clearance("lip", "cage.pocket_radial_clearance_mm", "radial at the lips of the pocket", 0.32),
 )
 # Those whose changes in operation a result reports.
 REPORTED = tuple(clearance for clearance in CLEARANCES if clearance.words)

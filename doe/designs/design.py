@@ -168,11 +168,13 @@ def axial_distance(
     - "spherical": sqrt(k); axial points are as far out as the corners of the cube
     - "orthogonal_blocks": alpha^2 = k (1 + n0s/(2k)) / (1 + n0c/F); cube and axial block shift no term
     - "orthogonal_columns": alpha^2 = (sqrt(F N) - F)/2; estimates of the square terms are independent
+    - "practical": k^(1/4); the corners of the box that the axial points span are nearer to the runs than in a rotatable design
     - "face_centred": 1; "inscribed": 1, with a smaller cube
 
     Raises MethodError for an unknown word or a number that is not positive and finite.
 
-    Source: Box and Hunter (1957), rotatability and blocks; Khuri and Cornell, Response Surfaces (1987), columns.
+    Source: Box and Hunter (1957), rotatability and blocks; Khuri and Cornell, Response Surfaces (1987), columns; documentation
+    of Design-Expert (Stat-Ease), practical.
     """
     cube = 2**factors if cube_runs is None else cube_runs
     total = cube + 2 * factors + sum(centres)
@@ -181,6 +183,7 @@ def axial_distance(
         "spherical": math.sqrt(factors),
         "orthogonal_blocks": math.sqrt(factors * (1 + centres[1] / (2 * factors)) / (1 + centres[0] / cube)),
         "orthogonal_columns": math.sqrt((math.sqrt(cube * total) - cube) / 2),
+        "practical": math.pow(factors, 0.25),
         "face_centred": 1.0,
         "inscribed": 1.0,
     }

@@ -81,7 +81,9 @@ Kind = Literal[
     "central_composite", "box_behnken", "full_factorial", "latin_hypercube", "sobol", "definitive_screening",
     "d_optimal", "i_optimal",
 ]  # fmt: skip
-Alpha = Literal["rotatable", "spherical", "orthogonal_blocks", "orthogonal_columns", "face_centred", "inscribed"]
+Alpha = Literal[
+    "rotatable", "spherical", "orthogonal_blocks", "orthogonal_columns", "practical", "face_centred", "inscribed"
+]
 
 # Keys of only some kinds of design.
 KEYS_OF = {

@@ -16,7 +16,7 @@ from doe.dimension_chain.allocation import Allocation
 from doe.dimension_chain.closing import NoValueError
 from doe.dimension_chain.links import Part as ChainPart
 from doe.dimension_chain.links import grade_words
-from doe.study_file.sections import StudyChain, Tolerances
+from doe.study_file.sections import StudyChain
 from doe.workflow.problem import Problem
 from rbdyn.base.arrays import Array
 from rbdyn.base.faults import InputError, MethodError
@@ -27,8 +27,6 @@ from rbdyn.scene.uncertain import MARKING
 
 # Usual grades: of ground raceways, of turned and milled cages and their lands.
 RACEWAY_GRADE, CAGE_GRADE = "IT5", "IT7"
-# Finest grade that a study takes as makeable unless it states another; its tolerance may exceed a step by this factor.
-FINEST_GRADE, STRETCH = f"IT{Tolerances.model_fields['finest_grade'].default}", 1.3
 # Decimals [mm] of an estimated land, and of sums.
 MICROMETRES, DIGITS = 3, 9
 # Half width of rollers of one lot [mm].
@@ -158,8 +156,7 @@ class Manufacture(NamedTuple):
 def manufacture_of(group: ClearanceParts, step: float) -> Manufacture:
     """The usual grade of the parts, or the next finer one that leaves the clearance within a step [mm] of the design.
 
-    The finest grade that can be made may exceed the step slightly, because a finer one would be no help. Raises InputError for a
-    part outside the tables of ISO 286.
+    Raises InputError for a part outside the tables of ISO 286.
     """
     widths = [(part, _grades(group, part)) for part in group.parts if not part.graded]
     rollers = sum(abs(part.coefficient) for part in group.parts if part.graded)
@@ -174,8 +171,8 @@ def manufacture_of(group: ClearanceParts, step: float) -> Manufacture:
         return Manufacture(round(width, DIGITS), half, f"{grade} (ISO 286-1): {sizes}{graded}{why}")
 
     halves = ROLLER_HALF_WIDTHS if rollers else ROLLER_HALF_WIDTHS[:1]
-    candidates = [(made(grade, half), STRETCH if grade == FINEST_GRADE else 1.0) for half in halves for grade in finer]
-    return next((one for one, stretch in candidates if one.half_width <= stretch * step), candidates[-1][0])
+    candidates = [made(grade, half) for half in halves for grade in finer]
+    return next((candidate for candidate in candidates if candidate.half_width <= step), candidates[-1])
 
 
 def _grades(group: ClearanceParts, part: Part) -> dict[str, float]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import product
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -67,6 +69,26 @@ def test_three_factors_in_standard_order():
 def test_literature_rotatable_alpha(factors, cube, alpha):
     """Literature: NIST/SEMATECH e-Handbook, Table 3.23."""
     assert central_composite(factors, cube=cube).coded.max() == pytest.approx(alpha, abs=5e-4)
+
+
+@pytest.mark.parametrize("factors", [3, 4])
+def test_practical_alpha_predicts_the_box_better_and_still_shows_a_cubic(factors):
+    """In the box of its axial points; a cubic leaves residuals as large as the bias that it causes there, which three levels hide."""
+    corners = np.array(list(product((-1.0, 1.0), repeat=factors)))
+    places = np.random.default_rng(1).uniform(-1.0, 1.0, (4000, factors))
+    terms, variance, seen = model_terms(factors, "quadratic"), {}, {}
+    for alpha in ("rotatable", "practical", "face_centred"):
+        coded = central_composite(factors, alpha=alpha).coded
+        rows, here, there = (model_matrix(points, terms) for points in (coded / coded.max(), places, corners))
+        inverse = np.linalg.inv(rows.T @ rows)
+        variance[alpha] = [np.einsum("ij,jk,ik->i", points, inverse, points).mean() for points in (here, there)]
+        cubic = (coded[:, 0] / coded.max()) ** 3
+        coefficients = inverse @ rows.T @ cubic
+        residual = np.sqrt(((cubic - rows @ coefficients) ** 2).sum() / (len(rows) - rows.shape[1]))
+        seen[alpha] = residual / np.sqrt(((places[:, 0] ** 3 - here @ coefficients) ** 2).mean())
+    assert axial_distance(factors, "practical") == pytest.approx(factors**0.25)
+    assert (np.array(variance["practical"]) < 0.6 * np.array(variance["rotatable"])).all()
+    assert seen["face_centred"] < 1e-9 and seen["practical"] == pytest.approx(1.0, abs=0.15)
 
 
 @pytest.mark.parametrize(
