@@ -8,7 +8,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from conftest import ROOT
+from conftest import EVERYTHING, ROOT
 from scipy.stats import f_oneway
 from short_studies import short_study
 
@@ -46,7 +46,9 @@ def result(*overrides: str) -> SimulationResult:
 
 def test_sliding_is_friction_power_over_its_coefficient():
     """The coefficient times all sliding is the power of friction, of pockets and of a land without a film."""
-    run = result("model.guide_land='dry'", "model.land_friction=0.08")
+    # The laws of a cage that a rotating load drives on a dry land, as test_verdict_of_bearings compiles them.
+    load = ("operation.radial_load_N=0", "operation.rotating_load_N=1300", "numerics.companion=false")
+    run = result(*load, "model.guide_land='dry'", "model.land_friction=0.08")
     scene, powers = Scene.from_dict(run.scene), run.power_terms_W
     pockets = scene.model.pocket_friction * scene.bearing.rollers * run.damage["pocket_sliding_N_m_s"].value
     assert pockets == pytest.approx(powers["pocket_friction"], rel=1e-9)
@@ -201,7 +203,8 @@ def test_mean_force_slides_at_the_speed_of_the_rollers():
     assert run.damage["pocket_sliding_N_m_s"].value == pytest.approx(
         speed * run.damage["pocket_force_mean_N"].value, rel=0.05
     )
-    wet = result("model.pocket_film=true")
+    # Every law, as test_surroundings compiles them.
+    wet = result(*EVERYTHING, "numerics.companion=false")
     assert wet.damage["pocket_impact_power_W"].value > wet.power_terms_W["pocket_damping"]
 
 
