@@ -124,9 +124,9 @@ class Design(Consistent):
     seed: Annotated[int, Field(ge=0)] = 1
     """Seed of the design and of its runs."""
     fewest_replicates: Annotated[int, Field(ge=2, le=10000)] = 4
-    """Replicates of each run at first. Default: 4, or numerics.replicates if it is less than 8 or limits.cage is set. Effect:
-    runs get the others only if noise exceeds a tenth of the variance of a predicted response with a goal, or a run is near a
-    limit."""
+    """Replicates of each run at first. Default: 4, or numerics.replicates if it is less than 8. Effect: runs get the others only
+    if noise exceeds a tenth of the variance of a predicted response with a goal, or a run is near a limit. They also get them
+    if replicates of a run differ about limits.cage."""
 
     @property
     def centres(self) -> int:

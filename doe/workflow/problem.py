@@ -254,13 +254,10 @@ class Problem(Study):
 
     @cached_property
     def first_replicates(self) -> int:
-        """Replicates of a design run at first: all where few are more than half, or where the class of the cage is limited.
-
-        All replicates together judge that class.
-        """
+        """Replicates of a design run at first: all where few are more than half."""
         fewest, usual = self.file.design.fewest_replicates, self.usual_replicates
         alike = all(scene.numerics.replicates == usual for scene in scenes_of(self.usual_run))
-        return fewest if alike and 2 * fewest <= usual and not self.file.limits.classes else usual
+        return fewest if alike and 2 * fewest <= usual else usual
 
     @property
     def further_replicates(self) -> int:
@@ -412,10 +409,10 @@ class Problem(Study):
     def _confirmation_scene(self, point: Array, sets: Sequence[str], in_brief: bool = False) -> Scene:
         settings, seed = self.file.confirmation, self.file.design.seed + CONFIRMATION_SEEDS
         replicates = min(self.first_replicates, settings.replicates) if in_brief else settings.replicates
-        if self._is_minor(sets):
+        if (minor := self._is_minor(sets)) or (in_brief and self.file.limits.classes):
             # A class of the cage needs some replicates alike.
-            fewest = 2 if in_brief else main_scene(self.usual_run).verdict.limits.fewest_replicates
-            replicates = max(replicates // 2, min(replicates, fewest))
+            fewest = 2 if minor and in_brief else main_scene(self.usual_run).verdict.limits.fewest_replicates
+            replicates = max(replicates // 2 if minor else replicates, min(settings.replicates, fewest))
         effort = [f"numerics.replicates={replicates}", f"numerics.companion={str(not in_brief).lower()}"]
         scene = self.scene_at(point, seed, [*sets, *effort, *settings.set], confirms=True)
         needed = scene.verdict.limits.fewest_replicates

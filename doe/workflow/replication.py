@@ -1,5 +1,7 @@
 """Replicates by need: design runs have few at first, and get the others where noise would be much of what a surface predicts.
 
+They also get them where the first ones differ about a limit on the class of the cage: then all judge it together.
+
 A surface of p terms fitted to n runs averages their noise: its predictions at the runs have p/n of the variance of that.
 """
 
@@ -15,7 +17,7 @@ from doe.running.store import Failure
 from doe.study_file.sections import at_point
 from doe.workflow.design import terms_of
 from doe.workflow.problem import Problem
-from doe.workflow.runs import Runs, run_design
+from doe.workflow.runs import Runs, other_cages, run_design
 from rbdyn.base.arrays import Array, Whole
 from rbdyn.base.estimate import Estimate
 from rbdyn.base.tables.sheet import listed
@@ -47,7 +49,9 @@ def standard_errors(half_widths: Array, number: Whole) -> Array:
 def run_by_need(study: Problem, simulations: clearance.Simulations, progress: Progress, notice: Notice) -> Runs:
     """The design runs, with all their replicates where the first ones are too few; ``notice`` hears why. Raises as `run_design`."""
     runs = run_design(study, simulations, progress)
-    if not study.further_replicates or not (names := noisy(study, runs)):
+    if not study.further_replicates:
+        return runs
+    if not (names := [*noisy(study, runs), *["limits.cage.verdict"] * runs.has_open_cages]):
         return runs
     if notice is not None:
         notice(
@@ -97,7 +101,10 @@ def _continued(study: Problem, runs: Runs, simulations: clearance.Simulations) -
     at_points = {
         name: joined(at, [at_point(name, figure) for figure in study.figures]) for name, at in runs.at_points.items()
     }
-    return replace(joined(runs, study.responses), at_points=at_points)
+    cages = None if runs.other_cages is None else runs.other_cages.copy()
+    if cages is not None and (further := other_cages(study, sound)) is not None:
+        cages[rows] += (further - cages[rows]) * study.further_replicates / usual
+    return replace(joined(runs, study.responses), at_points=at_points).with_cages(cages)
 
 
 def _mean(first: Runs, further: Runs, shares: Array) -> Estimate:

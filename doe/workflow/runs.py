@@ -38,8 +38,8 @@ class Runs(Record):
     values of each half-width (0: unknown; None: all unknown). ``block`` (n,) labels each run; None: one block.
     ``failures``: failed design runs, which are not in the arrays. ``turns``: shaft turns of all runs. ``at_points``: by
     point of the duty, the same runs with the figures of the simulation there as responses; empty without a duty. ``design``: of
-    simulated runs, with those added in place of failed ones. ``replicates_a_point``: replicates of each simulated run. ``cages_missed`` (n,): whether most replicates have a cage of no class that
-    the study allows; None where that is so at no run or at all.
+    simulated runs, with those added in place of failed ones. ``replicates_a_point``: replicates of each simulated run. ``other_cages`` (n, p): by point of the duty, the part of the replicates
+    whose cage has no class that the study allows; None without a limit.
     """
 
     coded: Array
@@ -53,7 +53,7 @@ class Runs(Record):
     turns: float = 0.0
     at_points: Mapping[str, "Runs"] = field(default_factory=dict)
     design: Design | None = None
-    cages_missed: Mask | None = None
+    other_cages: Array | None = None
     replicates_a_point: int = 0
 
     @property
@@ -61,6 +61,30 @@ class Runs(Record):
         """Place in the design, from 0, of each row."""
         failed = {failure.run for failure in self.failures}
         return [row for row in range(len(self.coded) + len(failed)) if row + 1 not in failed]
+
+    @property
+    def cages_missed(self) -> Mask | None:
+        """Whether most replicates of a run (n,) have a cage of no class that the study allows; None where none or all have."""
+        if self.other_cages is None:
+            return None
+        missed: Mask = np.asarray((self.other_cages > 0.5).any(axis=1))
+        return missed if missed.any() and not missed.all() else None
+
+    @property
+    def has_open_cages(self) -> bool:
+        """Whether replicates of a run differ about the classes that the study allows."""
+        return self.other_cages is not None and bool(((self.other_cages > 0.0) & (self.other_cages < 1.0)).any())
+
+    def with_cages(self, other_cages: Array | None) -> Self:
+        """The same with these parts of other cages, and a note on the runs outside the limit."""
+        runs = replace(self, other_cages=other_cages)
+        notes = [note for note in self.notes if note.code != "cage-class"]
+        if (missed := runs.cages_missed) is not None:
+            count = int(missed.sum())
+            words = f"{counted(count, 'design run')} of {len(missed)} {are(count)} outside limits.cage.verdict."
+            fix = "Front and selected design stay where the cage of the nearest run meets it."
+            notes.insert(0, Note("cage-class", f"{words} {fix}"))
+        return replace(runs, notes=tuple(notes))
 
     def only(self, places: list[int]) -> Self:
         """The rows at these places."""
@@ -106,11 +130,6 @@ def run_design(study: Problem, simulations: clearance.Simulations, progress: Pro
         notes.insert(
             0, Note("lost-runs", f"{left_out}{instead} Front and selected design stay near runs that went well.")
         )
-    missed = _cages_missed(study, sound)
-    if missed is not None:
-        runs_words = f"{counted(int(missed.sum()), 'design run')} of {len(sound)} {are(int(missed.sum()))} outside"
-        sentence_words = f"{runs_words} limits.cage.verdict. Front and selected design stay where the cage of the nearest run meets it."
-        notes.insert(0, Note("cage-class", sentence_words))
     values, errors, independent = clearance.figures(study.responses, sound)
     block = np.array(design.block_numbers)[rows] if design.blocks > 1 else None
     runs = Runs(
@@ -124,9 +143,8 @@ def run_design(study: Problem, simulations: clearance.Simulations, progress: Pro
         failures,
         turns=simulations.turns,
         design=design,
-        cages_missed=missed,
         replicates_a_point=study.first_replicates,
-    )
+    ).with_cages(other_cages(study, sound))
     at_points = {}
     for name in study.shares:
         columns = [at_point(name, figure) for figure in study.figures]
@@ -179,11 +197,11 @@ def _with_replacements(study: Problem, ordered: RunPlan, results: Sequence[Simul
     )
 
 
-def _cages_missed(study: Problem, results: Sequence[Simulated]) -> Mask | None:
-    """By result whether most replicates have no class of the limit, at any point of a duty; None where none or all have none."""
-    classes = study.file.limits.classes
-    missed = np.array([any(found.mostly_other_than(classes) for found in cages_of(each).values()) for each in results])
-    return missed if classes and missed.any() and not missed.all() else None
+def other_cages(study: Problem, results: Sequence[Simulated]) -> Array | None:
+    """Part (n, p) of the replicates whose cage has no class of the limit, by point of the duty; None without a limit."""
+    if not (classes := study.file.limits.classes):
+        return None
+    return np.array([[found.part_other_than(classes) for found in cages_of(each).values()] for each in results])
 
 
 def with_remaining(study: Problem, runs: Runs) -> Problem:

@@ -233,9 +233,9 @@ class CageVerdict(Record):
             return True
         return False if self.share_of(self._others(names)) >= self.least_share else None
 
-    def mostly_other_than(self, names: Collection[str]) -> bool:
-        """Whether more than half of the replicates are judged to have none of these classes."""
-        return self.part_of(self._others(names)) > 0.5
+    def part_other_than(self, names: Collection[str]) -> float:
+        """Part of the replicates that are judged to have none of these classes."""
+        return self.part_of(self._others(names))
 
     def _others(self, names: Collection[str]) -> list[str]:
         """Classes of replicates that are none of these; a motion that is not judged may rattle or wander."""

@@ -14,7 +14,7 @@ from short_studies import paper_study, short_study
 
 from doe.clearance import FURTHER_SEEDS
 from doe.study_file.sections import OtherLimits
-from doe.workflow import whole
+from doe.workflow import replication, whole
 from doe.workflow.confirmation import Choice, confirm, confirmed_from
 from doe.workflow.effort import Effort
 from doe.workflow.problem import Problem, Settings
@@ -51,11 +51,51 @@ def test_unit_few_replicates_are_at_most_half(usual, first):
         assert [s.model_dump(exclude=excluded) for s in firsts] == [s.model_dump(exclude=excluded) for s in further]
 
 
-def test_unit_a_class_needs_all_replicates():
-    """Plan: all replicates together judge the class of the cage; the limit of a response leaves few at first."""
+def held_alone(study: Problem) -> Problem:
+    """The study with a limit on the class of the cage."""
+    return study.with_file(limits=OtherLimits.model_validate({"cage": {"verdict": "held"}}))
+
+
+def test_unit_limits_leave_few_replicates_at_first():
+    """Plan: limits on a response and on the class of the cage leave few replicates at first; points in brief have as many as name one."""
     study = with_replicates(8)
-    held = study.with_file(limits=OtherLimits.model_validate({"cage": {"verdict": "held"}}))
-    assert [each.first_replicates for each in (study, held, with_limits(study, upper=100.0))] == [4, 8, 4]
+    held = held_alone(study)
+    assert [each.first_replicates for each in (study, held, with_limits(study, upper=100.0))] == [4, 4, 4]
+    brief = [each.confirmation_run(each.centre, in_brief=True).numerics.replicates for each in (study, held)]
+    assert brief == [4, held.usual_run.verdict.limits.fewest_replicates] == [4, 6]
+
+
+@pytest.mark.parametrize(
+    ("first", "further", "open_class", "missed"),
+    [(0.0, 0.0, False, False), (1.0, 1.0, False, True), (0.75, 0.0, True, False), (0.25, 1.0, True, True)],
+)
+def test_unit_replicates_that_differ_about_a_class_get_the_others(monkeypatch, first, further, open_class, missed):
+    """Study: a run whose first replicates differ about the class has all judge it; the note and the region follow from these."""
+    study, parts, ran = held_alone(with_replicates(8)), np.zeros((RUNS, 1)), list[int]()
+    parts[3] = first
+    runs = Runs(
+        study.design.coded, study.plan.actual, np.ones((RUNS, 3)), np.zeros((RUNS, 3)), design=study.design
+    ).with_cages(parts)
+    monkeypatch.setattr(replication, "run_design", lambda *asked: runs)
+    monkeypatch.setattr(replication, "noisy", lambda *asked: [])
+    others = np.zeros((RUNS, 1))
+    others[3] = further
+    monkeypatch.setattr(replication, "other_cages", lambda *asked: others)
+
+    class Further:
+        def progress(self, title):
+            return None
+
+        def run(self, scenes, labels, progress):
+            ran.append(len(scenes))
+            return [instant_result(scene) for scene in scenes]
+
+    heard = list[str]()
+    judged = replication.run_by_need(study, Further(), None, heard.append)
+    assert ran == [RUNS] * open_class
+    assert heard == ["4 replicates are too few for limits.cage.verdict: all runs continue to 8"] * open_class
+    assert (judged.cages_missed is not None and bool(judged.cages_missed[3])) == missed
+    assert [note.code for note in judged.notes].count("cage-class") == missed
 
 
 def with_limits(study: Problem, **limits: float) -> Problem:
