@@ -162,7 +162,7 @@ def test_command_line_tolerances(scene):
     assert tolerances["pocket_clearance_mm"] == pytest.approx(0.5 * grades[5.15]["IT7"] + 0.001)
     assert study["front"]["tolerance_aware"] == "quantile" and study["tolerances"]["keep"] == 0.5
     assert (
-        "IT3 (ISO 286-1): outer_raceway 4 um and inner_raceway 4 um, rollers within 1 um of nominal; IT5 would be wider than a step"
+        "IT4 (ISO 286-1): outer_raceway 7 um and inner_raceway 6 um, rollers within 1 um of nominal; IT5 would be wider than a step"
         in text
     )
     assert "chain" not in study
