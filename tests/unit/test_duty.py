@@ -506,11 +506,14 @@ def test_the_interval_of_the_worst_ratio_holds_the_truth():
 
 @pytest.mark.slow
 def test_a_search_and_a_robust_judgement_over_a_duty_are_the_same_with_any_workers(tmp_path):
-    """Short simulations of the example: worst and relative figures, a limit at a point, all steps of a study."""
+    """Short simulations of the example: worst and relative figures, a limit at a point, all steps of a study.
+
+    One batch of the search. By a stated method, for the choice would compile a second one.
+    """
     inputs = (
         '[robust]\npoints = 32\n[uncertain]\nset = ["numerics.turns=2", "numerics.discard_turns=1", "numerics.replicates=2", '
-        '"numerics.extend=false", "numerics.companion=false", "numerics.impact_window_turns=1"]\n'
-        '[adaptive]\nbudget = 40\nset = ["numerics.extend_limit=1"]\n[front]'
+        '"numerics.extend=false", "numerics.companion=false", "numerics.impact_window_turns=1", "numerics.method=rk43"]\n'
+        '[adaptive]\nbudget = 36\nset = ["numerics.extend_limit=1"]\n[front]'
     )
     relative = (POWER, f'{POWER}upper = 245.0\naggregate = "worst_relative"\npoints = ["cruise"]\n')
     keys = relative, (IMPACT, f'{IMPACT}aggregate = "worst"\n'), ("[front]", inputs)
