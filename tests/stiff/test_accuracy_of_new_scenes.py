@@ -9,6 +9,7 @@ from __future__ import annotations
 import sys
 import time
 import tomllib
+from functools import partial
 
 import numpy as np
 import pytest
@@ -55,12 +56,15 @@ def new_scene(seed: int) -> Scene:
 
 
 def short_study(study: str, scene: Scene) -> accuracy.Report:
-    """A study with few repeats."""
+    """A study with few repeats, of one start, whose references are compared after its own stretch alone."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(coverage, "REPEATS", 2)
         patch.setattr(coverage, "TRUTH_REPLICATES", 2)
         patch.setattr(coverage, "TRUTH_LENGTH", 2.0)
         patch.setattr(methods, "STARTS", 1)
+        patch.setattr(methods, "starts_after_transient", partial(methods.starts_after_transient, starts=1))
+        patch.setattr(methods, "SPANS", (methods.DEFAULT_TURNS,))
+        patch.setattr(methods, "REPEATS", 1)
         return accuracy.study(study, scene)
 
 
