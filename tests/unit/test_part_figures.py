@@ -56,9 +56,10 @@ def test_the_figures_of_parts_are_those_of_the_report_with_errors():
     for gap in of_kind("clearance"):
         operating = run.clearance_um[gap.source[0]]["operating"]
         assert figures[gap.key].value == pytest.approx(operating) and figures[gap.key].error == 0.0
+    race_records = run.as_dict()["races"]
     for contact in of_kind("contact"):
         race, key = contact.source
-        assert figures[contact.key].value == run.races[race][key] and figures[contact.key].statistical_error > 0.0
+        assert figures[contact.key].value == race_records[race][key] and figures[contact.key].statistical_error > 0.0
     scene = Scene.load(ROOT / "examples" / "cylindrical_roller.toml")
     assert (
         figures["life_h"].value == static_life(scene).hours(*scene.operation.speeds) and figures["life_h"].error == 0.0

@@ -382,7 +382,7 @@ def test_doe_new_writes_the_region_that_runs(tmp_path, monkeypatch):
     assert "The region of the guide clearance moved from " in result.stderr
     data = tomllib.loads(result.stdout)
     guide = next(factor for factor in data["factor"] if factor["name"] == "guide_clearance_mm")
-    assert guide["centre"] > 0.15 and guide["step"] == pytest.approx(0.045, abs=1e-3)
+    assert guide["centre"] > 0.15 and guide["step"] == pytest.approx(0.057, abs=1e-3)
     (tmp_path / "written.toml").write_text(result.stdout, encoding="utf-8")
     assert moved_region(Problem.load(tmp_path / "written.toml"), unheated).notes == ()
     hot_study(tmp_path, cage=30.0)
