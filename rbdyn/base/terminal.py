@@ -66,11 +66,12 @@ def text(blocks: Iterable[Block], detail: Detail = Detail.USUAL, width: int | No
 def _remarks(block: Remarks, alarms: Sequence[str], page: "Page", detail: Detail) -> str:
     """The warnings with their numbers, those of other blocks first, then notes; below full detail merged, without general ones.
 
-    Remarks that are no warnings are then cut, and a line says where the others are.
+    Remarks that are no warnings are then cut, and a line says where the others are. There is one fewer where the warnings of other blocks
+    are among them.
     """
     every, first = condensed(block.listed), block.listed
     if detail < Detail.ALL:
-        room = max(MOST_NOTES - len(of_level(condensed(block.notes), DANGER)) - len(alarms), 0)
+        room = max(MOST_NOTES - block.gathers - len(of_level(condensed(block.notes), DANGER)) - len(alarms), 0)
         first = [note for note in every if not CODES[note.code].general][:room]
     warnings = [*alarms, *(note for note in first if note.level == WARNING)]
     numbered = [f"warning: {text}" for text in warnings]
