@@ -200,10 +200,11 @@ def choose(
     kept: list[bool] = []
     front, lost = surface_front, 0
     while True:
-        simulated = [baseline, *(point for point, _, _ in trials)] if trials else []
+        tried = [point for point, _, _ in trials]
+        simulated = [baseline, *tried] if tried else []
         candidate = None if searched is None else searched_pick(study, searched, simulated, len(trials))
         points = choices(study, front, searched, candidate)
-        if any(np.array_equal(points["pick"].point, point.point) for point, _, _ in trials):
+        if any(np.array_equal(points["pick"].point, point.point) for point in tried):
             break
         try:
             confirmed, _ = confirm(study, baseline, {"pick": points["pick"]}, simulations)
@@ -225,10 +226,9 @@ def choose(
             # No surface has a class: the front stays away from there.
             study = _without(study, points["pick"].point)
         if searched is None:
-            front = find_front(study, [baseline, *(point for point, _, _ in trials)], kept.count(False))
-            if front.violations is not None and (
-                any(kept) or not _promises_less(study, front, [point for point, _, _ in trials])
-            ):
+            tried.append(confirmed["pick"])
+            front = find_front(study, [baseline, *tried], kept.count(False))
+            if front.violations is not None and (any(kept) or not _promises_less(study, front, tried)):
                 break
     # Of points that keep their limits the last one counts, which is of a front.
     best = min(
