@@ -285,17 +285,21 @@ def _race_loads(contacts: RollerContacts, approach: Array, centrifugal: float) -
     thrown = (centrifugal / contacts.stiffness) ** (1.0 / LINE_EXPONENT)
     high = np.maximum(approach - np.min(inner_relief), np.max(outer_relief) + thrown)
     high = np.maximum(high, low)
-    outside = 0.5 * (low + high)
+    # A roller without load rests at the high end, and of the others nearly linear forces lead from there.
+    outside = high
     for _ in range(BALANCE_STEPS):
         inner, outer = loads(approach - outside, inner_relief), loads(outside, outer_relief)
         excess = outer.sum(axis=1) - inner.sum(axis=1) - centrifugal
-        if np.all(np.abs(excess) <= BALANCE_ERROR * (outer.sum(axis=1) + centrifugal)):
+        balanced = np.abs(excess) <= BALANCE_ERROR * (outer.sum(axis=1) + centrifugal)
+        if balanced.all():
             break
         # dQ/d delta = K^0.9 (10/9) Q^0.1
         slope = LINE_EXPONENT * lamina**0.9 * (outer**0.1 + inner**0.1).sum(axis=1)
         low, high = np.where(excess < 0.0, outside, low), np.where(excess < 0.0, high, outside)
         newton = outside - np.divide(excess, slope, out=np.full(excess.shape, np.inf), where=slope > 0.0)
-        outside = np.where((newton > low) & (newton < high), newton, 0.5 * (low + high))
+        inside = np.where((newton > low) & (newton < high), newton, 0.5 * (low + high))
+        # A step from a root is none, which would count as one out of the bracket.
+        outside = np.where(balanced, outside, inside)
     return inner, outer
 
 
