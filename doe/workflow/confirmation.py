@@ -11,7 +11,7 @@ from typing import Literal
 import numpy as np
 
 from doe.clearance import Simulations
-from doe.duty import DutyResult, Simulated, cages_of
+from doe.duty import DutyResult, Run, Simulated, cages_of
 from doe.running.store import Failure
 from doe.unknown.propagation import Share
 from doe.workflow.problem import Problem
@@ -19,7 +19,7 @@ from doe.workflow.runs import EstimatedValue
 from doe.workflow.surfaces import gain_verdict
 from rbdyn.base.arrays import Array, one_thread
 from rbdyn.base.estimate import Estimate, chance_above, one_sided, standard_errors, times_wider
-from rbdyn.base.faults import RunError
+from rbdyn.base.faults import InputError, RunError
 from rbdyn.base.notes import DANGER, Note, Notes, condensed, of_level
 from rbdyn.base.records import Record, derived, finite, keyed, outside_json, spread
 from rbdyn.base.words import chance, decimals, improvement, quantity, with_error
@@ -152,6 +152,14 @@ def simulate_original(study: Problem, simulations: Simulations) -> Confirmed:
     if isinstance(result, Failure):
         raise RunError(f"the baseline design cannot be simulated: {result}")
     return confirmed_from(study, Choice(study.baseline, "the baseline design"), result)
+
+
+def run_where_possible(study: Problem, point: Array) -> Run | None:
+    """The confirmation run of a point (k,) in factor units; None where no bearing has these values."""
+    try:
+        return study.confirmation_run(point)
+    except InputError:
+        return None
 
 
 @one_thread

@@ -29,7 +29,7 @@ from doe.pareto.search import Archive, Doubt, dominates
 from doe.pareto.tolerance import PartCount
 from doe.response_surface import Surface
 from doe.response_surface.adequacy import correlation
-from doe.workflow.confirmation import Confirmed
+from doe.workflow.confirmation import Confirmed, run_where_possible
 from doe.workflow.problem import Problem
 from doe.workflow.surfaces import Simulated, draw_all, drawn_responses, predict_all, predict_draws, quadratics
 from rbdyn.base.arrays import Array, Rows, one_thread
@@ -142,23 +142,14 @@ def _uncertainty(study: Problem, pareto: ParetoFront) -> FrontUncertainty:
 
 def part_ends(study: Problem) -> Array:
     """Ends (k, 2) of the parts in factor units: those of the region, and beyond by the tolerances where such a bearing is possible."""
-    ends, without_scene = study.ends.copy(), not _is_possible(study, study.baseline)
+    ends, without_scene = study.ends.copy(), run_where_possible(study, study.baseline) is None
     for place, name in enumerate(study.factors):
         for side, sign in enumerate((-1.0, 1.0)):
             point = study.baseline.copy()
             point[place] = ends[place, side] + sign * study.known_tolerances.get(name, 0.0)
-            if without_scene or _is_possible(study, point):
+            if without_scene or run_where_possible(study, point) is not None:
                 ends[place, side] = point[place]
     return ends
-
-
-def _is_possible(study: Problem, point: Array) -> bool:
-    """Whether there is a scene at a point (k,) in factor units."""
-    try:
-        study.scene_at(point, study.file.design.seed)
-    except InputError:
-        return False
-    return True
 
 
 def _tolerance_aware(study: Problem, pareto: ParetoFront, box: ToleranceBox, doubt: Doubt) -> ToleranceAware:

@@ -34,6 +34,7 @@ from doe.workflow.confirmation import (
     every_limit,
     limits_of,
     point_words,
+    run_where_possible,
     verdict_of,
 )
 from doe.workflow.front import tolerance_box, tolerances_out_of_reach
@@ -43,7 +44,6 @@ from doe.workflow.replication import standard_errors
 from doe.workflow.surfaces import predict_all, quadratics
 from doe.workflow.tolerances import PickTolerances
 from rbdyn.base.arrays import Array, Mask
-from rbdyn.base.faults import InputError
 from rbdyn.base.notes import Note, Notes
 from rbdyn.base.records import Record, derived, finite
 from rbdyn.base.words import Notice, counted, improvement, quantity, shown, with_error
@@ -265,14 +265,8 @@ def _least_move(study: Problem, pick: Confirmed, sides: Array, places: list[int]
         column = values[:, study.responses.index(limit.response)]
         beyond = column - limit.bound if limit.sense == "<=" else limit.bound - column
         broken |= beyond > -limit.margin
-    for point in points[~broken]:
-        try:
-            study.confirmation_run(point)
-        except InputError:
-            # No scene has these values.
-            return None
-        return np.asarray(point)
-    return None
+    first = next(iter(points[~broken]), None)
+    return None if first is None or run_where_possible(study, first) is None else np.asarray(first)
 
 
 def original_sentences(study: Problem, baseline: Confirmed) -> list[str]:

@@ -32,6 +32,7 @@ from doe.workflow.confirmation import (
     confirmed_from,
     every_limit,
     limits_of,
+    run_where_possible,
     verdict_of,
 )
 from doe.workflow.front import SURFACE_DRAWS, Draws, ErrorField, Misses, find_front, standard_errors_of, tolerance_box
@@ -39,7 +40,6 @@ from doe.workflow.problem import Problem
 from doe.workflow.runs import EstimatedValue
 from doe.workflow.surfaces import CHUNK, jacobian, quadratics
 from rbdyn.base.arrays import Array, Whole
-from rbdyn.base.faults import InputError
 from rbdyn.base.records import Record, finite
 from rbdyn.base.words import improvement, quantity, shown
 
@@ -471,12 +471,9 @@ def _gains_by_simulation(
     for index, side in names:
         point = pick.point.copy()
         point[index] += side * AHEAD * study.step[index]
-        try:
-            runs.append(study.confirmation_run(point))
-        except InputError:
-            # No scene has this value of the factor.
-            continue
-        reachable.append((index, point))
+        if (run := run_where_possible(study, point)) is not None:
+            runs.append(run)
+            reachable.append((index, point))
     labels = [f"beyond the bound of {study.factors[index]}" for index, _ in reachable]
     results = simulations.run(runs, labels, simulations.progress("beyond the region")) if reachable else []
     goals = study.goals
