@@ -135,6 +135,9 @@ STATUS_CODES = {
 IMPOSSIBLE = {"overload": "overloaded", "heat": "too hot"}
 
 
+UNDECIDED = "undecided: "  # how the note of such a status begins
+
+
 def status_notes(status: str) -> Notes:
     """The ``status`` of a result, with its reason behind a colon, as a note; none where the answer is sound."""
     kind = status.partition(":")[0]
@@ -177,12 +180,14 @@ def of_level(notes: Iterable[Note], level: Level) -> list[Note]:
 
 
 def verdict(notes: Iterable[Note], further: int = 0) -> str:
-    """The first danger, else that there is none, with the number of warnings to read, ``further`` ones among them."""
+    """The first danger, else that there is none, with what is undecided and the number of warnings, ``further`` ones among them."""
     notes = condensed(notes)
     dangers, warnings = of_level(notes, DANGER), len(of_level(notes, WARNING)) + further
     warned = f"{warnings} warning{'s' if warnings > 1 else ''}" if warnings else ""
     if not dangers:
-        return "; ".join(filter(None, ["No danger found", warned]))
+        undecided = next((note for note in notes if note.startswith(UNDECIDED)), "")
+        found = undecided.replace(UNDECIDED, "No danger found, but the temperatures are undecided: ") or "No danger found"
+        return "; ".join(filter(None, [found, warned]))
     return dangers[0]
 
 
