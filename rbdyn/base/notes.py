@@ -186,7 +186,7 @@ def verdict(notes: Iterable[Note], further: int = 0) -> str:
     warned = f"{warnings} warning{'s' if warnings > 1 else ''}" if warnings else ""
     if not dangers:
         undecided = next((note for note in notes if note.startswith(UNDECIDED)), "")
-        found = undecided.replace(UNDECIDED, "No danger found, but the temperatures are undecided: ") or "No danger found"
+        found = "No danger found" + undecided.replace(UNDECIDED, ", but the temperatures are undecided: ")
         return "; ".join(filter(None, [found, warned]))
     return dangers[0]
 

@@ -83,7 +83,7 @@ def test_notes_alike_are_one_and_the_worst_come_first():
     assert verdict(notes[1:4]) == "No danger found; 2 warnings" and verdict(notes[1:2]) == "No danger found; 1 warning"
     assert verdict(notes[:1]) == verdict([]) == "No danger found"
     # Sets of the inputs without a steady state leave the temperatures themselves decided.
-    assert verdict([Note("undecided", "temperatures: 3 % of 512 sets have no steady state")]) == "No danger found; 1 warning"
+    assert verdict([Note("undecided", "temperatures: 3 % of 512 sets have none")]) == "No danger found; 1 warning"
     found = verdict([*status_notes("undecided: 16 states did not settle"), notes[1]])
     assert found == "No danger found, but the temperatures are undecided: 16 states did not settle; 2 warnings"
 
