@@ -22,7 +22,7 @@ from rbdyn.base.notes import Note, Notes
 from rbdyn.base.records import Record
 from rbdyn.base.words import Notice
 from rbdyn.dynamics.ensemble import Outcome, Pace, Reporter, Stop, in_turn, run_all, threads_of
-from rbdyn.dynamics.forces.equations import RollerBearing, mechanical_energy
+from rbdyn.dynamics.forces.equations import RollerBearing
 from rbdyn.dynamics.forces.state import CAGE_ANGLE, CAGE_X
 from rbdyn.dynamics.integrators import advance
 from rbdyn.dynamics.parameters.model import pocket_width
@@ -198,7 +198,7 @@ class Recording:
         return (
             float(run.carry.y[run.layout.first_body + CAGE_ANGLE]),
             kinematic_cage_angle(run.scene, self._begin, run.clock_angles()),
-            sum(mechanical_energy(run.bearing, run.carry.y)),
+            sum(run.energies()),
         )
 
 

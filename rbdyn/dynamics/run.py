@@ -17,7 +17,7 @@ from rbdyn.base.faults import MethodError, RunError
 from rbdyn.base.notes import Note, Notes
 from rbdyn.dynamics.ensemble import Pace, Stop
 from rbdyn.dynamics.forces.cage import Impacts
-from rbdyn.dynamics.forces.equations import RollerBearing, mechanical_energy
+from rbdyn.dynamics.forces.equations import OF_MOTION, RollerBearing, mechanical_energy, without
 from rbdyn.dynamics.forces.race_samples import RaceSamples
 from rbdyn.dynamics.forces.state import CAGE_X, INNER_ANGLE, OUTER_ANGLE, RING_X, name
 from rbdyn.dynamics.integrators import advance
@@ -153,6 +153,11 @@ class Run:
             return self.carry.clock[advance.NOW] * np.array(self.scene.operation.speeds)
         return self.carry.y[clock + INNER_ANGLE : clock + OUTER_ANGLE + 1].copy()
 
+    def energies(self) -> tuple[float, float, float]:
+        """Kinetic, elastic and potential energy [J] of the present state."""
+        energies: tuple[float, float, float] = mechanical_energy(without(self.bearing, OF_MOTION), self.carry.y)
+        return energies
+
     def _why(self, status: advance.Status) -> str:
         time_s = self.carry.clock[advance.NOW]
         message, remedy = status.value
@@ -176,7 +181,7 @@ def prepare(scene: Scene, bearing: RollerBearing) -> float:
     started = time.perf_counter()
     run = Run(scene, bearing, 0, scene.numerics.rtol, Stop())
     run.to(0.0)
-    mechanical_energy(bearing, run.carry.y)
+    run.energies()
     return time.perf_counter() - started
 
 

@@ -12,7 +12,6 @@ from smooth_runs import fixed_step, run_of, vibrating
 
 from rbdyn.base.faults import RunError
 from rbdyn.dynamics.ensemble import CancelledError
-from rbdyn.dynamics.forces.equations import mechanical_energy
 from rbdyn.dynamics.integrators import advance as at
 from rbdyn.dynamics.integrators import runge_kutta as dp
 from rbdyn.dynamics.integrators.advance import advance, interpolate, refine_peak
@@ -156,11 +155,11 @@ def test_invariant_energy_without_friction(conservative, replicate):
     drift = {}
     for rtol in (1e-5, 1e-6, 1e-7):
         run = run_of(conservative, rtol, "rk45", replicate)
-        kinetic, elastic, potential = mechanical_energy(run.bearing, run.carry.y)
+        kinetic, elastic, potential = run.energies()
         start, worst = kinetic + elastic + potential, 0.0
         for turn in range(10):
             run.to(turn + 1.0)
-            worst = max(worst, abs(sum(mechanical_energy(run.bearing, run.carry.y)) - start))
+            worst = max(worst, abs(sum(run.energies()) - start))
         # The sum of the pockets' forces is an impulse, not a work.
         assert (np.delete(run.tally.work, POCKET_FORCE) == 0.0).all()
         assert worst < 1e-6 * (kinetic + elastic)
@@ -176,9 +175,9 @@ def test_invariant_power_balance(fixture, method, request):
     gaps: list[float] = []
     for rtol in scene.numerics.rtol * np.array([10.0, 1.0, 0.1, 0.01]):
         run = run_of(scene, rtol, method)
-        start = sum(mechanical_energy(run.bearing, run.carry.y))
+        start = sum(run.energies())
         run.to(4.0)
-        change = sum(mechanical_energy(run.bearing, run.carry.y)) - start
+        change = sum(run.energies()) - start
         gaps.append(abs(run.tally.work[SHAFT] - run.tally.work[:SHAFT].sum() - change) / run.tally.work[SHAFT])
     assert gaps[1] < 0.005
     assert (run.tally.work >= 0.0).all()

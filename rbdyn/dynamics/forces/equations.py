@@ -79,6 +79,24 @@ class RollerBearing(NamedTuple):
     samples: Any
 
 
+# Laws of motion alone, and what else rollers that rest between the races do not meet.
+OF_MOTION = ("open_film", "drag", "impacts", "samples")
+OFF_RACES = (*OF_MOTION, "pocket", "guide", "cage", "outer_ring", "drive", "gravity")
+
+
+def without(bearing: RollerBearing, fields: tuple[str, ...]) -> RollerBearing:
+    """The bearing with None for these fields, and for what races do to a roller that moves.
+
+    Functions that read none of them are compiled once, whatever laws a scene has there.
+    """
+    left_out: dict[str, Any] = dict.fromkeys(fields)
+    outer, inner = (
+        race._replace(damping=None, traction=None, rolling=None, tangential=None)
+        for race in (bearing.outer, bearing.inner)
+    )
+    return bearing._replace(outer=outer, inner=inner, **left_out)
+
+
 @kernel
 def roller_count(bearing):
     """Number of rollers, never negative: so the compiler reads and writes neighbours as vectors, not one by one."""

@@ -16,7 +16,7 @@ from rbdyn.base.records import Record
 from rbdyn.contact.hertz_line import palmgren
 from rbdyn.contact.traction import traction
 from rbdyn.dynamics.forces.bodies import action
-from rbdyn.dynamics.forces.equations import RollerBearing, static_loads, static_share
+from rbdyn.dynamics.forces.equations import OFF_RACES, RollerBearing, static_loads, static_share, without
 from rbdyn.dynamics.forces.state import CAGE_ANGLE, CAGE_SPEED, CAGE_VX, CAGE_VY, CAGE_X, CAGE_Y, RING_X, Layout, layout
 from rbdyn.properties.materials import equivalent_modulus
 from rbdyn.scene import Scene
@@ -191,13 +191,13 @@ def load_distribution(scene: Scene, bearing: RollerBearing, load: float, positio
 
     The cage stands at ``positions`` angles, which divide a pitch evenly: the mean over them is the mean over a turn.
     """
-    count, speed = bearing.rollers, scene.geometry.motion.cage_speed
+    count, speed, races = bearing.rollers, scene.geometry.motion.cage_speed, without(bearing, OFF_RACES)
     outer, inner = np.empty((positions, count)), np.empty((positions, count))
     radii = np.empty(count)
     for row in range(positions):
         angles = 2.0 * np.pi * (np.arange(count) + (row + 0.5) / positions) / count
-        ring_x = static_share(bearing, angles, speed, load, radii)
-        static_loads(bearing, angles, ring_x, radii, outer[row], inner[row])
+        ring_x = static_share(races, angles, speed, load, radii)
+        static_loads(races, angles, ring_x, radii, outer[row], inner[row])
     return LoadDistribution(outer, inner)
 
 
@@ -242,7 +242,7 @@ def start_state(scene: Scene, bearing: RollerBearing, generator: np.random.Gener
         angles = pockets + (offset * np.sin(direction - pockets) + wall * (0.3 + shares) * pocket) / pitch_radius
     cage_speed = rolled * motion.cage_speed
     radii = np.empty(z)
-    ring_x = static_share(bearing, angles, cage_speed, acting.load_x, radii)
+    ring_x = static_share(without(bearing, OFF_RACES), angles, cage_speed, acting.load_x, radii)
     cosine, sine = np.cos(angles), np.sin(angles)
     y[: 5 * z] = np.concatenate(
         (
