@@ -45,7 +45,7 @@ CODES: dict[str, Code] = {
     "corner": Code(WARNING, "some runs of a design meet a danger, which the note names"),
     "open-limit": Code(WARNING, "a limit at the selected design is too near its bound for the error"),
     "chain": Code(WARNING, "a dimension chain is not solved, or wider than the gains allow"),
-    "clearance": Code(WARNING, "more than half of a clearance is lost in operation"),
+    "clearance": Code(WARNING, "more than half of a cage clearance is lost in operation, or balls get a preload"),
     "fast": Code(WARNING, "speed above the reference speed, where a bearing needs more cooling than usual"),
     "unit": Code(WARNING, "a value that looks like another unit"),
     "designation": Code(WARNING, "dimensions that contradict the designation"),

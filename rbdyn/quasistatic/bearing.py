@@ -3,6 +3,7 @@
 Under inner or half raceway control several equilibria may share a load; ``other_roots`` searches for the others.
 """
 
+import math
 import time
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
@@ -46,6 +47,8 @@ from rbdyn.scene import BallScene, Scene, balls_only
 from rbdyn.scene.ball import DoubleDeckerScene, SingleRowScene
 from rbdyn.scene.fits import growth_record, row_change
 from rbdyn.scene.notes import clearance_notes, speed_notes
+from rbdyn.scene.operation import Mounting
+from rbdyn.scene.thermal import PART_TEMPERATURES
 
 # Solvers by the names in a scene: ``solver(row, control, load, constraint, start) -> Solution``.
 SOLVERS: dict[str, Callable[..., Solution]] = {"convex": solve, "finite_search": finite_search.solve}
@@ -120,9 +123,21 @@ def _limit_notes(scene: SingleRowScene, model: RowModel) -> Notes:
     bearing, (inner, outer) = scene.bearing, scene.operation.speeds
     plays = {}
     if bearing.kind == "deep_groove_ball" and scene.mounting is not None:
-        drawn = clearance_of(row_of(scene.model_copy(update={"mounting": None, "thermal": None})).row)[0]
-        plays["radial"] = OperatingClearance(drawn, clearance_of(model.row)[0] - drawn, 0.0, 0.0)
-    return (*clearance_notes(plays), *speed_notes(inner - outer, bearing.pitch_diameter, None, FASTEST[bearing.kind]))
+        plays["radial"] = _radial_clearance(scene, scene.mounting, model)
+    # Balls bear a slight preload, so that a clearance which is lost need not seize them.
+    clearances = clearance_notes(plays, {"radial": -math.inf})
+    return (*clearances, *speed_notes(inner - outer, bearing.pitch_diameter, None, FASTEST[bearing.kind]))
+
+
+def _radial_clearance(scene: SingleRowScene, mounting: Mounting, model: RowModel) -> OperatingClearance:
+    """Radial clearance of a mounted row: on the drawing, then with its fits, its temperatures and its rotation."""
+    still = mounting.model_copy(update={"rotation": False})
+    cold = still.model_copy(update=dict.fromkeys(PART_TEMPERATURES))
+    before = [
+        clearance_of(row_of(scene.model_copy(update={"mounting": state, "thermal": None})).row)[0]
+        for state in (None, cold, still)
+    ]
+    return OperatingClearance(before[0], *np.diff([*before, clearance_of(model.row)[0]]).tolist())
 
 
 def _other_roots(scene: SingleRowScene, model: RowModel, solution: Solution) -> list[RowState] | None:

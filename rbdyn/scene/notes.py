@@ -160,19 +160,21 @@ def clearance_notes(
 ) -> Notes:
     """Notes on diametral ``clearances`` [m], by name, that are negative, nearly lost or, of a cage, mostly lost in operation.
 
-    ``floors`` [m]: what must be left of each; a tenth of the drawn clearance where there is none.
+    ``floors`` [m]: what must be left of each, minus infinity of one that may become a preload; a tenth of the drawn clearance where
+    there is none.
     """
     notes = []
     for name, play in clearances.items():
         if play is None:
             continue
         lost = play.operating < (floors or {}).get(name, NEARLY_LOST * max(play.drawn, 0.0))
-        if not lost and (name == "radial" or play.operating >= MOSTLY_LOST * play.drawn):
+        preloads = play.operating < 0.0 <= play.drawn and not lost
+        if not (lost or preloads) and (name == "radial" or play.operating >= MOSTLY_LOST * play.drawn):
             continue
-        subject = "seizure: " if lost else ""
+        subject, effect = "seizure: " if lost else "", "all results include this preload; " if preloads else ""
         sentence = (
             f"{subject}{name} clearance in operation is {1e6 * play.operating:.1f} um of {1e6 * play.drawn:.1f} um: fits "
-            f"{1e6 * play.fit:+.1f}, temperature {1e6 * play.temperature:+.1f}, rotation {1e6 * play.rotation:+.1f} um; widen it or "
+            f"{1e6 * play.fit:+.1f}, temperature {1e6 * play.temperature:+.1f}, rotation {1e6 * play.rotation:+.1f} um; {effect}widen it or "
             "check the temperatures"
         )
         notes.append(Note("seizure" if lost else "clearance", sentence))

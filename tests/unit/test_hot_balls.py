@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import subprocess
 import sys
 import tomllib
@@ -14,11 +15,13 @@ from in_process import in_process
 
 import rbdyn
 from rbdyn.base.faults import InputError
+from rbdyn.base.notes import Level
 from rbdyn.quasistatic.row.model import row_of
 from rbdyn.quasistatic.sweep import sweep
 from rbdyn.quasistatic.temperatures import at_temperatures, balance, heat_at, slopes_at, steady_temperatures
 from rbdyn.scene import Scene
 from rbdyn.scene.input_ranges import QUANTILES, SETS, input_sets
+from rbdyn.scene.operation import raceway_radii
 from rbdyn.scene.thermal import Temperatures
 from rbdyn.thermal.losses import gain
 from rbdyn.thermal.network import NODES
@@ -189,6 +192,28 @@ def test_unit_a_first_guess_is_no_axis_of_a_sweep():
         sweep(scene_of(DEEP), {"lubricant.temperature_C": [40.0, 80.0]})
     stated_viscosity = scene_of(DEEP, lubricant__temperature_C=40.0, lubricant__viscosity_mPas=30.0)
     assert len(sweep(stated_viscosity, {"lubricant.temperature_C": [40.0, 60.0]}).statuses) == 2
+
+
+def test_unit_a_lost_clearance_is_a_preload_with_its_causes():
+    """Literature: a slight preload may even serve balls (SKF, bearing clearance), so it is a warning; free rings grow by heat alone."""
+    parts = {"outer": 50.0, "inner": 60.0, "rollers": 65.0, "oil": 50.0}
+    tight, free = (
+        stated(
+            scene_of(
+                DEEP, bearing__radial_clearance_mm=drawn, mounting__inner_interference_um=fit, mounting__rotation=turns
+            ),
+            parts,
+        )
+        for drawn, fit, turns in ((0.012, 15.0, True), (0.005, -50.0, False))
+    )
+    (note,) = rbdyn.equilibrium(tight, ranges=False).notes[:1]
+    assert (note.level, note.code) == (Level.WARNING, "clearance") and "results include this preload" in note
+    found, drawn, *causes = (float(number) for number in re.findall(r"(-?\+?\d+\.\d) ?(?:um|,)", note))
+    assert found == pytest.approx(drawn + sum(causes), abs=0.21) and drawn == 12.0 and -15.0 < causes[0] < -10.0
+    (free_note,) = rbdyn.equilibrium(free, ranges=False).notes[:1]
+    inner, outer = (1e3 * 2.0 * radius for radius in raceway_radii(free.bearing))
+    grown = 1e3 * free.material("ball").thermal_expansion * (outer * 30.0 - inner * 40.0 - 2.0 * 11.906 * 45.0)
+    assert f"fits +0.0, temperature {grown:+.1f}, rotation +0.0 um" in free_note
 
 
 def test_unit_too_hot_and_seizure():
