@@ -7,6 +7,7 @@ import re
 import tempfile
 import tomllib
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
@@ -36,6 +37,7 @@ if TYPE_CHECKING:
     from doe.workflow.effort import Effort
     from doe.workflow.parts import ClearanceParts, Manufacture
     from doe.workflow.problem import Problem
+    from rbdyn.result import Quantity
     from rbdyn.scene import Scene
     from rbdyn.scene.duty import DutyPoint
     from rbdyn.verdict.orbits import CageVerdict
@@ -67,8 +69,9 @@ DISCARDED, FEWER = 20, 7
 # class of the cage, and of one that counts the turns between. Impacts have windows that fit both.
 SHORT_RUN = ("numerics.extend=false", "numerics.impact_window_turns=4")
 BETWEEN = (*SHORT_RUN, f"numerics.discard_turns={FEWER}", f"numerics.turns={(DISCARDED - FEWER) // 4 * 4}")
-# Largest bias by fewer turns, over the error of six replicates: a third of the error of the four of a design run.
-SLIGHT_BIAS = 0.5
+# Largest bias by fewer turns, over the error of six replicates: half of the error of the four of a design run; and over the figure,
+# up to which it decides nothing.
+SLIGHT_BIAS, NEGLIGIBLE_BIAS = 0.75, 1e-3
 HELD = """# Cage: held in a short run of the scene, so its whirl ratio means little and the impact power is a goal instead.
 # You can still name the whirl ratio: [[response]] with name = "whirl_deviation_ratio" and goal = "min".
 """
@@ -76,8 +79,9 @@ BOUNDS = {"<=": "upper", "=": "upper", ">=": "lower"}
 POINT = """[[duty]]
 name = {name}
 share = {share!r} # {unit}
-set = {set}
+set = {set}{mark}
 """
+SLOW = " # forgets its start later than the points that discard fewer turns"
 # Of a study that derives its tolerances, whose chains are made to these.
 DERIVED = "would state it. Default: as [tolerances] derives it, otherwise as the factor states it"
 MARK = "estimated = true # until a drawing states it: parts and reports mark it\n"
@@ -139,7 +143,7 @@ def new(
         limits, class_limit = limits_of(limit or []), _class_limit(limit or [])
         scene = rollers_only(DrawnScene.load(path))
         points, hours = _duty(duty, scene)
-        sections = {"responses": _responses(limits) + class_limit, "duty": points, "baseline": ""}
+        sections = {"responses": _responses(limits) + class_limit, "duty": duty_text(points, hours), "baseline": ""}
         factors = _factors(read_toml(path))
         values = {"quoted": _quoted_path(path, out), "hours": "true" if hours else None}
 
@@ -162,7 +166,9 @@ def new(
             if {cage.name for cage in cages.values()} == {"held"}:
                 sections["responses"] = HELD + _responses(limits, {WHIRL: IMPACT_POWER}) + class_limit
                 text, study = written(factors)
-            if cages and settles_early(study, folder, effort):
+            slow = slow_points(study, folder, effort) if cages else []
+            if len(slow) < len(cages) and (points or not slow):
+                sections["duty"] = duty_text(points, hours, slow)
                 text, study = written(factors, FEWER)
         check_study(study)
         hand_out(text, as_json, out, force, "doe study", reads)
@@ -202,28 +208,54 @@ def baseline_cages(study: "Problem", folder: Path, effort: "Effort") -> "dict[st
     return {} if isinstance(result, Failure) else cages_of(result)
 
 
-def settles_early(study: "Problem", folder: Path, effort: "Effort") -> bool:
-    """Whether fewer discarded turns hardly bias any response with a goal, by short runs of the baseline.
+def slow_points(study: "Problem", folder: Path, effort: "Effort") -> list[str]:
+    """Points of the duty, or OPERATION, where fewer discarded turns bias a response with a goal, by short runs of the baseline.
 
-    A heat balance takes place in the discarded turns, so that fewer save nothing there.
+    They are all points where a run fails. A heat balance is made once: the turns between are at its temperatures.
     """
-    from doe.duty import scenes_of
+    from doe.duty import OPERATION, main_scene
     from doe.running.store import Failure
 
-    run = _short_run(study, SHORT_RUN)
-    if (scene := scenes_of(run)[0]).thermal is not None:
-        return False
-    usual, between = _baseline_results(
-        study, [run, _short_run(study, BETWEEN, more=2)], "the turns to discard", folder, effort
-    )
-    if isinstance(usual, Failure) or isinstance(between, Failure):
-        return False
-    share = (DISCARDED - FEWER) / scene.numerics.turns
-    for place in study.goals.objectives:
-        figure, early = (result.responses[study.responses[place]] for result in (usual, between))
-        if share * abs(early.value - figure.value) > SLIGHT_BIAS * (figure.statistical_error or 0.0):
-            return False
-    return True
+    (usual,) = _baseline_results(study, [_short_run(study, SHORT_RUN)], "", folder, effort)
+    if not isinstance(usual, Failure):
+        between = _at_temperatures_of(usual, _short_run(study, BETWEEN, more=2))
+        (early,) = _baseline_results(study, [between], "the turns to discard", folder, effort)
+        if not isinstance(early, Failure):
+            names, sooner = [study.responses[place] for place in study.goals.objectives], _figures_at(early)
+            turns = main_scene(study.usual_run).numerics.turns
+            return [
+                point
+                for point, figures in _figures_at(usual).items()
+                if any(_biased(figures[name], sooner[point][name], turns) for name in names)
+            ]
+    return [*study.shares] or [OPERATION]
+
+
+def _biased(figure: "Quantity", early: "Quantity", turns: float) -> bool:
+    """Whether a run that counts the ``early`` figure too, of so many turns, is biased by much of its error."""
+    bias = (DISCARDED - FEWER) / turns * abs(early.value - figure.value)
+    return bias > max(SLIGHT_BIAS * (figure.statistical_error or 0.0), NEGLIGIBLE_BIAS * abs(figure.value))
+
+
+def _figures_at(result: "Simulated") -> "Mapping[str, Mapping[str, Quantity]]":
+    """Figures by point of the duty, or under OPERATION."""
+    from doe.duty import OPERATION, DutyResult
+
+    return result.at_points if isinstance(result, DutyResult) else {OPERATION: result.responses}
+
+
+def _at_temperatures_of(result: "Simulated", run: "Run") -> "Run":
+    """The run at the temperatures that the heat balances of a result have."""
+    from doe.duty import OPERATION, DutyResult, DutyScenes, scene_at
+    from rbdyn.scene.thermal import Temperatures, at_temperatures
+
+    results = result.points if isinstance(result, DutyResult) else {OPERATION: result}
+    hot = {
+        name: at_temperatures(scene_at(run, name), Temperatures(**{node: it.value for node, it in nodes.items()}))
+        for name, found in results.items()
+        if (nodes := found.temperatures_C) is not None
+    }
+    return replace(run, scenes={**run.scenes, **hot}) if isinstance(run, DutyScenes) else hot.get(OPERATION, run)
 
 
 def _short_run(study: "Problem", settings: Sequence[str], more: int = 1) -> "Run":
@@ -240,10 +272,10 @@ def _short_run(study: "Problem", settings: Sequence[str], more: int = 1) -> "Run
 def _baseline_results(
     study: "Problem", runs: "Sequence[Run]", purpose: str, folder: Path, effort: "Effort"
 ) -> "list[Simulated | Failure]":
-    """Results of short runs of the baseline; the notice hears of the last of them, as others are in the store."""
+    """Results of short runs of the baseline; the notice hears of their ``purpose``, if they have one."""
     from doe.duty import scenes_of
 
-    if effort.notice is not None:
+    if effort.notice is not None and purpose:
         scenes = scenes_of(runs[-1])
         numerics = scenes[0].numerics
         turns = numerics.replicates * (numerics.turns + numerics.warm_up_turns)
@@ -363,15 +395,15 @@ def _chain_text(group: "ClearanceParts", manufacture: "Manufacture", derived: bo
     return "".join([head, *links])
 
 
-def _duty(path: Path | None, scene: "Scene") -> tuple[str, bool]:
+def _duty(path: Path | None, scene: "Scene") -> "tuple[list[DutyPoint], bool]":
     """The duty of the study, and whether its shares are hours; empty without a file of its points. Raises InputError."""
     if path is None:
-        return "", False
+        return [], False
     from rbdyn.scene.duty import duty_scenes, in_hours, read_duty
 
     points = read_duty(path)
     duty_scenes(scene, points, str(path))
-    return duty_text(points, in_hours(points)), in_hours(points)
+    return points, in_hours(points)
 
 
 def _quoted(value: str | list[str]) -> str:
@@ -380,11 +412,18 @@ def _quoted(value: str | list[str]) -> str:
     return "".join(f"\\u{ord(character):04x}" if character in "{}#" else character for character in text)
 
 
-def duty_text(points: "Sequence[DutyPoint]", hours: bool) -> str:
-    """The [[duty]] tables of a study; ``hours``: whether shares are hours."""
-    unit = "h" if hours else "of the time"
+def duty_text(points: "Sequence[DutyPoint]", hours: bool, slow: Sequence[str] = ()) -> str:
+    """The [[duty]] tables of a study; ``hours``: whether shares are hours; ``slow``: points that discard more turns than the others."""
+    unit, more = "h" if hours else "of the time", [f"numerics.discard_turns={DISCARDED}"]
     return "\n".join(
-        POINT.format(name=_quoted(point.name), share=point.share, unit=unit, set=_quoted(point.set)) for point in points
+        POINT.format(
+            name=_quoted(point.name),
+            share=point.share,
+            unit=unit,
+            set=_quoted([*point.set, *(more if point.name in slow else [])]),
+            mark=SLOW if point.name in slow else "",
+        )
+        for point in points
     )
 
 

@@ -30,7 +30,7 @@ from rbdyn.mounting.cage import NEARLY_K, RunningClearance
 from rbdyn.result import SimulationResult
 from rbdyn.scene import DrawnScene, Scene
 from rbdyn.scene.lubricant import HOTTEST_C
-from rbdyn.scene.thermal import Near, Temperatures, ceilings, near_of, part_temperatures
+from rbdyn.scene.thermal import Near, Temperatures, begun_near, ceilings, near_of, part_temperatures
 
 # Share of its width that a stated region keeps at least: it is narrowed that far, and moves beyond.
 KEPT = 0.5
@@ -222,7 +222,7 @@ def _balanced(
         return {}
     found: dict[str, Temperatures | str] = {}
     try:
-        scenes = _scenes(study, point, BALANCE)
+        scenes = {name: begun_near(at, study.near.get(name)) for name, at in _scenes(study, point, BALANCE).items()}
     except InputError as error:
         return dict.fromkeys(names, str(error))
     labels = [f"{words}{f' at {name}' if name else ''}" for name in names]

@@ -37,7 +37,7 @@ from rbdyn.scene import Scene
 from rbdyn.scene.input_ranges import input_ranges
 from rbdyn.scene.notes import heat_notes
 from rbdyn.scene.thermal import Temperatures, Thermal, at_temperatures, inlet_temperature, part_temperatures, too_hot
-from rbdyn.thermal.fixed_point import CLEAR, VAGUE, State, learned, model_of, next_step, steady_state
+from rbdyn.thermal.fixed_point import CLEAR, TOLERANCE, VAGUE, State, learned, model_of, next_step, steady_state
 from rbdyn.thermal.losses import HOTTEST, HeatModel, gain, log_viscosity, no_residue
 from rbdyn.thermal.network import NODES, carried_off
 
@@ -59,11 +59,13 @@ MOST_WHOLE_RUNS = 4
 # Share of the last step that counts as error: its slopes of about 0.3 are known within a third.
 LAST_STEP = 0.1
 
-# Least turns in which a search from a similar bearing finds the temperatures, in two parts or a few more; the share of a part that
-# counts in it; turns that do not count after a small step.
-TRANSIENT_TURNS, MOST_PARTS, LATE_SHARES, RESUMED_TURNS = 20.0, 4, (0.4, 0.7), 3.0
+# A search from a similar bearing finds the temperatures in the turns that do not count: usual and least turns of a part, most
+# further parts, the share of the first and of another part that counts in it, and turns that do not count after a small step.
+PART_TURNS, LEAST_PART, MORE_PARTS, LATE_SHARES, RESUMED_TURNS = 8.5, 4.0, 2, (0.4, 0.7), 3.0
 # Steps [K] of such a search: up to which the bearings are similar, and from which its slopes serve.
 SIMILAR, SMALL = 25.0, 3.0
+# Deviation [K] up to which its last step corrects the temperatures and the loss without another run: a tenth of it is an error.
+CORRECTED = 1.0
 
 # Simulates a scene by its parameters, from given states if any: replicates, and the time that they took.
 Simulate = Callable[[Scene, RollerBearing, Reporter, Sequence[Array]], tuple[Ensemble, dict[str, float]]]
@@ -125,8 +127,9 @@ def short(scene: Scene) -> Scene:
 def short_turns(scene: Scene, threads: int = 1) -> tuple[float, float]:
     """Shaft turns of the short runs of a search that each thread makes one after the other, and those of one run."""
     if scene.thermal is not None and scene.thermal.near is not None:
-        length = max(scene.numerics.warm_up_turns, TRANSIENT_TURNS)
-        return math.ceil(scene.numerics.replicates / threads) * RESUMED_TURNS, 0.5 * length
+        parts, length = _parts(scene)
+        more = parts * length + RESUMED_TURNS - scene.numerics.warm_up_turns
+        return math.ceil(scene.numerics.replicates / threads) * more, length
     few = short(scene).numerics
     length = few.warm_up_turns + few.turns
     states = SHORT_STATES + (0 if scene.thermal is None or scene.thermal.start is None else START_STATES)
@@ -287,9 +290,10 @@ def near_verdict(balance: Balance) -> Verdict | None:
     if near is None:
         return None
     slopes, temperatures, path, ends = np.array(near.slopes), np.array(near.temperatures_C), list[State](), ()
-    for part in range(MOST_PARTS):
+    parts, length = _parts(balance.scene)
+    for part in range(parts + MORE_PARTS):
         try:
-            state = balance.at(temperatures, partial(_part, LATE_SHARES[min(part, 1)]), starts=ends)
+            state = balance.at(temperatures, partial(_part, length, LATE_SHARES[min(part, 1)]), starts=ends)
         except (InputError, RunError):
             return None
         if (
@@ -306,14 +310,20 @@ def near_verdict(balance: Balance) -> Verdict | None:
         ends, size = state.run.ensemble.ends, np.abs(temperatures - state.temperatures).max()
         if size > SIMILAR:
             return None
-        if part and size < SMALL:
+        if part + 1 >= parts and size < SMALL:
             return Verdict("steady", "", slopes, path, temperatures, ends)
     return None
 
 
-def _part(late: float, scene: Scene) -> Scene:
-    """The scene with runs of half its transient, of which the share ``late`` counts."""
-    length = 0.5 * max(scene.numerics.warm_up_turns, TRANSIENT_TURNS)
+def _parts(scene: Scene) -> tuple[int, float]:
+    """Number and turns of the parts of a search from a similar bearing, which with the turns after them do not count."""
+    turns = scene.numerics.warm_up_turns - RESUMED_TURNS
+    number = max(round(turns / PART_TURNS), 1)
+    return number, max(turns / number, LEAST_PART)
+
+
+def _part(length: float, late: float, scene: Scene) -> Scene:
+    """The scene with runs of a part of so many turns, of which the share ``late`` counts."""
     counted = {"turns": late * length, "discard_turns": (1.0 - late) * length}
     return with_numerics(short(scene), **counted, replicates=scene.numerics.replicates)
 
@@ -345,18 +355,18 @@ def with_temperatures(
         ends = ends and state.run.ensemble.ends
         path.append(state)
         temperatures = corrected(state, verdict.slopes)
-        if _closes(state, verdict.slopes):
+        if closes := _closes(state, verdict.slopes, CORRECTED if ends else TOLERANCE):
             break
     status, reason = verdict.status, verdict.reason
-    if verdict.steady and not _closes(state, verdict.slopes):
+    if verdict.steady and not closes:
         status, reason = "undecided", _open_reason(state, verdict.slopes)
     return Balanced(_result(balance, path, verdict.slopes, status, reason, gather), balance, path)
 
 
-def _closes(state: State, slopes: Array) -> bool:
-    """Whether the heat of a run balances within its error, and this error is small enough to know the temperatures."""
+def _closes(state: State, slopes: Array, tolerance: float) -> bool:
+    """Whether the heat of a run balances within the tolerance [K] or its error, and this is small enough to know the temperatures."""
     step = corrected(state, slopes) - state.temperatures
-    return state._replace(image=state.temperatures + step).closes() and float(state.noise.max()) <= VAGUE
+    return state._replace(image=state.temperatures + step).closes(tolerance) and float(state.noise.max()) <= VAGUE
 
 
 def _open_reason(state: State, slopes: Array) -> str:

@@ -12,7 +12,7 @@ from doe_command import doe
 from short_studies import EXAMPLES
 
 from doe.clearance import responses_of
-from doe.commands.new import baseline_cages, settles_early
+from doe.commands.new import baseline_cages, slow_points
 from doe.dimension_chain import chain_from, solve
 from doe.running.store import STORE, Failure, Store
 from doe.study_file.sections import StudyChain
@@ -233,7 +233,7 @@ def test_command_line_goals_follow_the_class_of_the_cage(scene, monkeypatch, cla
     """Command line: impact power instead of the whirl ratio where the cage is held at every point, and a comment; a limit still names it."""
     found = {point: SimpleNamespace(name=name) for point, name in classes.items()}
     monkeypatch.setattr("doe.commands.new.baseline_cages", lambda *study: found)
-    monkeypatch.setattr("doe.commands.new.settles_early", lambda *study: False)
+    monkeypatch.setattr("doe.commands.new.slow_points", lambda *study: [*found])
     text, study = written(scene)
     goals = [response["name"] for response in study["response"] if response["goal"] == "min"]
     assert goals == ["impact_force_N", goal, "power_loss_W"]
@@ -245,7 +245,7 @@ def test_command_line_goals_follow_the_class_of_the_cage(scene, monkeypatch, cla
 
 def test_command_line_design_runs_of_a_bearing_that_settles_early_discard_fewer_turns(scene, monkeypatch):
     """Command line: 7 turns instead of 20, but confirmations discard 20; a cage that no short run traces keeps them."""
-    monkeypatch.setattr("doe.commands.new.settles_early", lambda *study: True)
+    monkeypatch.setattr("doe.commands.new.slow_points", lambda *study: [])
     _, untraced = written(scene)
     monkeypatch.setattr(
         "doe.commands.new.baseline_cages", lambda *study: {"operation": SimpleNamespace(name="circling")}
@@ -263,7 +263,7 @@ def test_unit_short_runs_of_a_baseline(scene, tmp_path):
     effort = Effort(notice=lambda note: heard.append(str(note)))
     (cage,) = BASELINE_CAGES(study, tmp_path, effort).values()
     assert cage.name == "held" and cage.replicates == {"held": 6}
-    settles_early(study, tmp_path, effort)
+    slow_points(study, tmp_path, effort)
     assert heard == [
         "1 short run of 360 shaft turns for the class of the cage",
         "1 short run of 228 shaft turns for the turns to discard",
@@ -276,29 +276,60 @@ def test_unit_short_runs_of_a_baseline(scene, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("name", "early", "settles"),
+    ("name", "early", "slow"),
     [
-        ("power_loss_W", 102.9, True),
-        ("power_loss_W", 103.2, False),
-        ("impact_force_N", 96.8, False),
-        ("cage_slip", 1e3, True),
+        ("power_loss_W", 104.5, []),
+        ("power_loss_W", 104.8, ["operation"]),
+        ("impact_force_N", 95.2, ["operation"]),
+        ("cage_slip", 1e3, []),
     ],
 )
-def test_unit_a_bearing_settles_early_by_its_goals(scene, tmp_path, monkeypatch, name, early, settles):
-    """Unit: where 13 of 40 turns bias no goal by half of its error; not where a run failed, or its error is unknown, or it has heat."""
+def test_unit_a_bearing_is_slow_by_its_goals(scene, tmp_path, monkeypatch, name, early, slow):
+    """Unit: where 13 of 40 turns bias a goal by three quarters of its error, a run failed, or a goal without error moves by a thousandth."""
     (tmp_path / "study.toml").write_text(written(scene)[0], encoding="utf-8")
     study = Problem.load(tmp_path / "study.toml")
     usual = dict.fromkeys([*study.responses, "cage_slip"], Quantity(100.0, 2.0, 0.0, 40.0))
-    between = usual | {name: Quantity(early, 2.0, 0.0, 40.0)}
 
     def judged(*responses):
-        results = [each if isinstance(each, Failure) else SimpleNamespace(responses=each) for each in responses]
-        monkeypatch.setattr("doe.commands.new._baseline_results", lambda *study: results)
-        return settles_early(study, tmp_path, Effort())
+        results = [
+            each if isinstance(each, Failure) else SimpleNamespace(responses=each, temperatures_C=None)
+            for each in responses
+        ]
+        monkeypatch.setattr("doe.commands.new._baseline_results", lambda *study: [results.pop(0)])
+        return slow_points(study, tmp_path, Effort())
 
-    assert judged(usual, between) == settles
-    assert not judged(usual, Failure("baseline", "stopped"))
+    assert judged(usual, usual | {name: Quantity(early, 2.0, 0.0, 40.0)}) == slow
+    assert judged(usual, Failure("baseline", "stopped")) == ["operation"]
     unknown = usual | {"power_loss_W": Quantity(100.0, None, 0.0, 40.0)}
-    assert not judged(unknown, usual | {"power_loss_W": Quantity(100.1, None, 0.0, 40.0)})
-    study = Problem.load(EXAMPLES / "hot_clearance.toml")
-    assert not judged(usual, usual)
+    assert judged(unknown, usual | {"power_loss_W": Quantity(100.2, None, 0.0, 40.0)}) == []
+    assert judged(unknown, usual | {"power_loss_W": Quantity(100.5, None, 0.0, 40.0)}) == ["operation"]
+
+
+def test_command_line_points_of_a_duty_discard_turns_alone(tmp_path, monkeypatch):
+    """Command line: a slow point of the duty states its 20 turns, the others discard 7; where all are slow, the file states 20 for all."""
+    (tmp_path / "duty.csv").write_text(
+        "name,share,operation.inner_speed_rpm\nidle,0.2,6000\ncruise,0.8,20000\n", encoding="utf-8"
+    )
+    cages = {name: SimpleNamespace(name="circling") for name in ("idle", "cruise")}
+    monkeypatch.setattr("doe.commands.new.baseline_cages", lambda *study: cages)
+    studies = []
+    for slow in ([], ["idle"], ["idle", "cruise"]):
+        monkeypatch.setattr("doe.commands.new.slow_points", lambda *study, slow=slow: slow)
+        _, study = written(EXAMPLES / "cylindrical_roller.toml", "--duty", tmp_path / "duty.csv")
+        studies.append((study["scene"]["set"][1], *(point["set"][1:] for point in study["duty"])))
+    few, many = "numerics.discard_turns=7", "numerics.discard_turns=20"
+    assert studies == [(few, [], []), (few, [many], []), (many, [], [])]
+
+
+def test_unit_the_turns_between_are_at_the_temperatures_of_a_heat_balance(tmp_path, monkeypatch):
+    """Unit: a hot baseline is balanced once, at every point of its duty."""
+    study, asked = Problem.load(EXAMPLES / "hot_clearance.toml"), []
+    nodes = dict.fromkeys(("oil", "outer", "inner", "rollers"), Quantity(80.0, 0.1, 0.0, 40.0))
+    usual = SimpleNamespace(
+        responses=dict.fromkeys(study.responses, Quantity(100.0, 2.0, 0.0, 40.0)), temperatures_C=nodes
+    )
+    monkeypatch.setattr("doe.commands.new._baseline_results", lambda study, runs, *other: asked.extend(runs) or [usual])
+    assert slow_points(study, tmp_path, Effort()) == []
+    hot, at = asked
+    assert hot.thermal is not None and at.thermal is None
+    assert at.lubricant.temperature_C == 80.0 and at.numerics.discard_turns == 7.0

@@ -454,7 +454,7 @@ def test_unit_a_search_from_a_similar_bearing_needs_no_turn_of_its_own(hot):
     far = simulate(_scene(**changes), workers=1, notice=None)
     near = simulate(_scene(**changes, thermal={"near": _near(hot)}), workers=1, notice=None)
     assert near.status == "ok" and near.thermal.status == "steady"
-    turns = numerics["replicates"] * (numerics["discard_turns"] + 3.0 + numerics["turns"])
+    turns = numerics["replicates"] * (numerics["discard_turns"] + numerics["turns"])
     assert near.cost["turns"] == pytest.approx(turns) and near.cost["turns"] < 0.5 * far.cost["turns"]
     for node, figure in far.temperatures_C.items():
         other = near.temperatures_C[node]
