@@ -148,9 +148,8 @@ def new(
         values = {"quoted": _quoted_path(path, out), "hours": "true" if hours else None}
 
         def written(factors: list[Factor], discarded: int = DISCARDED) -> tuple[str, Problem]:
-            text = _filled(
-                _sections(scene, factors, tolerances, chains) | sections, values | _numerics(scene, discarded)
-            )
+            parts = _sections(scene, factors, tolerances, chains)
+            text = _filled(parts | sections, values | _numerics(scene, discarded))
             file = validated(StudyFile, tomllib.loads(text), f"study of {path}")
             return text, Problem(out or Path("study.toml"), file)
 
@@ -166,8 +165,7 @@ def new(
             if {cage.name for cage in cages.values()} == {"held"}:
                 sections["responses"] = HELD + _responses(limits, {WHIRL: IMPACT_POWER}) + class_limit
                 text, study = written(factors)
-            slow = slow_points(study, folder, effort) if cages else []
-            if len(slow) < len(cages) and (points or not slow):
+            if cages and len(slow := slow_points(study, folder, effort)) < len(cages):
                 sections["duty"] = duty_text(points, hours, slow)
                 text, study = written(factors, FEWER)
         check_study(study)
