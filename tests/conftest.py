@@ -7,6 +7,7 @@ default laws), ``inner`` (as ``outer``, but guided on the inner ring), ``conserv
 
 from __future__ import annotations
 
+import gc
 import os
 import subprocess
 import sys
@@ -20,6 +21,7 @@ from numpy.typing import NDArray
 
 from rbdyn.accuracy import fixed_step
 from rbdyn.base.faults import read_toml
+from rbdyn.base.streams import OBJECTS_A_COLLECTION
 from rbdyn.dynamics.forces.race_lanes import scratch
 from rbdyn.dynamics.forces.state import LOADS
 from rbdyn.dynamics.parameters.state import layout_of
@@ -110,7 +112,14 @@ def pytest_cmdline_main(config: pytest.Config) -> None:
     # Hundreds of processes import the same modules, and the next session too: the first keeps what it compiles of them.
     os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
     sys.dont_write_bytecode = False
-    if not config.pluginmanager.hasplugin("xdist") or hasattr(config, "workerinput"):
+    # As a command has it: the tests are many objects that stay.
+    gc.set_threshold(OBJECTS_A_COLLECTION)
+    if hasattr(config, "workerinput"):
+        # One process collects from the first folder, the other from the last: each compiles half of the files of a fresh checkout.
+        if config.workerinput["workerid"] == "gw1" and config.args == config.getini("testpaths"):
+            config.args = sorted(map(str, ROOT.glob("tests/[a-z]*/")), reverse=True)
+        return
+    if not config.pluginmanager.hasplugin("xdist"):
         return
     # Two processes whose linear algebra spins on two threads each wait for each other. Before any of them loads numpy.
     for library in ("OPENBLAS", "OMP", "MKL"):
@@ -124,9 +133,9 @@ def pytest_cmdline_main(config: pytest.Config) -> None:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """The dearest files first."""
+    """The dearest files first, all others by their paths."""
     place = {name: number for number, name in enumerate(DEAREST)}
-    items.sort(key=lambda item: place.get(item.path.stem, len(place)))
+    items.sort(key=lambda item: (place.get(item.path.stem, len(place)), item.path))
 
 
 def law_types(parameters: Any) -> set[type]:

@@ -88,8 +88,8 @@ def test_invariant_steady_temperatures(tables):
     nodes = np.array(list(result.temperatures_C.values()))
     assert np.abs(balance(scene, nodes).deviation).max() <= 1e-9
     for guess in (-10.0, 140.0):
-        other = rbdyn.equilibrium(scene.changed({"lubricant.temperature_C": guess}))
-        assert list(other.temperatures_C.values()) == pytest.approx(list(nodes), abs=1e-8)
+        other = steady_temperatures(scene.changed({"lubricant.temperature_C": guess}))
+        assert other.last.temperatures == pytest.approx(nodes, abs=1e-8)
     same = rbdyn.equilibrium(stated(scene, result.temperatures_C))
     assert same.report.balls == result.report.balls and same.report.contacts == result.report.contacts
     assert same.thermal is None and "thermal" not in same.as_dict() and "temperatures_C" not in same.as_dict()
@@ -285,12 +285,13 @@ def test_unit_sweep_over_a_runaway():
     """Unit: a sweep has temperatures, gain and friction by point, the same as single equilibria; runaway is a failed point."""
     rigid = scene_of(DEEP, mounting__housing_material=RIGID)
     swept = sweep(rigid, {"operation.inner_speed_rpm": [2000.0, 6000.0, 8000.0]})
-    alone = rbdyn.equilibrium(rigid)
-    assert swept.failures == {"no steady state": [2]} and swept.statuses[1] == "ok"
+    # At 6000 rpm most of the input sets of its ranges run away too, which takes long to find.
+    alone = rbdyn.equilibrium(rigid.changed({"operation.inner_speed_rpm": 2000.0}))
+    assert swept.failures == {"no steady state": [2]} and swept.statuses == ["ok", "ok", swept.statuses[2]]
     for node in NODES:
-        assert swept.columns[f"{node}_temperature_C"][1] == alone.temperatures_C[node]
-    assert swept.columns["thermal_gain"][1] == alone.thermal.gain
-    assert swept.columns["friction_W"][1] == sum(alone.thermal.friction_W.values())
+        assert swept.columns[f"{node}_temperature_C"][0] == alone.temperatures_C[node]
+    assert swept.columns["thermal_gain"][0] == alone.thermal.gain
+    assert swept.columns["friction_W"][0] == sum(alone.thermal.friction_W.values())
     assert np.isnan(swept.columns["oil_temperature_C"][2])
 
 
