@@ -82,8 +82,7 @@ def shell(line, **environment):
     return subprocess.run(["bash", "-c", script], capture_output=True, text=True, env=variables, check=False)
 
 
-@pytest.mark.parametrize("end", ENDS)
-@pytest.mark.parametrize("line", HELP)
+@pytest.mark.parametrize(("line", "end"), [*((HELP[0], end) for end in ENDS), (HELP[1], [*ENDS][-1])])
 def test_a_shell_closes_a_stream_of_a_new_interpreter(line, end):
     """Command line: | true, >&- and 2>&- as a shell makes them."""
     found = shell(f"{line} {end}")

@@ -287,7 +287,7 @@ def test_unit_sweep_over_a_runaway():
     swept = sweep(rigid, {"operation.inner_speed_rpm": [2000.0, 6000.0, 8000.0]})
     # At 6000 rpm most of the input sets of its ranges run away too, which takes long to find.
     alone = rbdyn.equilibrium(rigid.changed({"operation.inner_speed_rpm": 2000.0}))
-    assert swept.failures == {"no steady state": [2]} and swept.statuses == ["ok", "ok", swept.statuses[2]]
+    assert swept.failures == {"no steady state": [2]} and swept.statuses[:2] == ("ok", "ok")
     for node in NODES:
         assert swept.columns[f"{node}_temperature_C"][0] == alone.temperatures_C[node]
     assert swept.columns["thermal_gain"][0] == alone.thermal.gain

@@ -22,13 +22,14 @@ from rbdyn.thermal.fixed_point import State
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 SHORT = {
-    "turns": 10.0,
-    "discard_turns": 5.0,
+    "turns": 6.0,
+    "discard_turns": 3.0,
     "replicates": 2,
     "extend": False,
     "companion": True,
-    "impact_window_turns": 5.0,
+    "impact_window_turns": 3.0,
 }
+SHORTER = {**SHORT, "turns": 4.0, "discard_turns": 2.0, "impact_window_turns": 2.0, "companion": False}
 MOUNTING = {
     "bore_mm": 27.0,
     "outside_diameter_mm": 60.0,
@@ -389,8 +390,7 @@ def test_unit_a_cold_start_is_steady(oil, inlet):
     """Unit: cold oil has one stable state, warmer than its inlet; the search finds it, whatever the first guess, with a gain below one."""
     changes = {"lubricant": {**FLOW, "oil": oil, "oil_inlet_temperature_C": inlet}, "thermal": {"ambient_C": inlet}}
     # The method that is chosen here: the choice would compile another one, for these laws alone.
-    numerics = {**SHORT, "turns": 4.0, "discard_turns": 2.0, "impact_window_turns": 2.0, "method": "rk43"}
-    found = simulate(_scene(**changes, numerics=numerics), workers=1, notice=None)
+    found = simulate(_scene(**changes, numerics={**SHORTER, "method": "rk43"}), workers=1, notice=None)
     assert found.status == "ok" and found.thermal.gain < 0.7
     assert min(figure.value - (figure.error or 0.0) for figure in found.temperatures_C.values()) > inlet
     assert all(min(state.values()) >= inlet - 1e-9 for state in found.thermal.path_C[1:])
@@ -404,8 +404,7 @@ def test_unit_ranges_follow_the_exponents_that_the_search_found():
         "lubricant": {**FLOW, "oil": "MIL-L-7808", "oil_inlet_temperature_C": -60.0},
         "thermal": {"ambient_C": -60.0},
     }
-    numerics = {**SHORT, "turns": 4.0, "discard_turns": 2.0, "impact_window_turns": 2.0}
-    found = simulate(_scene(**cold, numerics=numerics), workers=1, notice=None)
+    found = simulate(_scene(**cold, numerics=SHORTER), workers=1, notice=None)
     assert found.thermal.ranges.unsteady == 0.0
     assert found.thermal.ranges.figures["inner"][-1] < found.temperatures_C["inner"].value + 75.0
 
@@ -430,7 +429,7 @@ def test_unit_slight_heat_takes_one_short_state(monkeypatch):
     """Unit: heat that warms no node by 1 K needs one short state, and gives the temperatures of the whole search in less work."""
     from rbdyn.dynamics.temperatures import Balance
 
-    slow = _scene(operation={"inner_speed_rpm": 500.0}, numerics={**SHORT, "companion": False})
+    slow = _scene(operation={"inner_speed_rpm": 500.0}, numerics=SHORTER)
     found = simulate(slow, workers=1, notice=None)
     assert found.status == "ok" and found.cost["states"] == 3
     monkeypatch.setattr(Balance, "slight", lambda balance, state: None)
