@@ -83,6 +83,7 @@ def unillustrated(patch: Any) -> None:
     from matplotlib.figure import Figure
 
     from doe import clearance
+    from doe.report import files
     from doe.report.still import Still
 
     def save(figure: Figure, place: Any, **options: Any) -> None:
@@ -91,6 +92,8 @@ def unillustrated(patch: Any) -> None:
         else:
             place.write("<svg/>")
 
+    for picture in ("response_surface", "save"):
+        patch(files, picture, lambda *content: content[-1].write_bytes(b""))
     patch(clearance, "histories", lambda *rest: {})
     patch(clearance, "draw_motion", lambda *rest: [])
     patch(Figure, "tight_layout", lambda figure, **options: None)
