@@ -23,6 +23,7 @@ and 0.58 in 2, 3 and 23 (35; -19 to +26 %). Cages of polyamide and pressed steel
 rounds too coarsely for their masses.
 """
 
+import functools
 import math
 import re
 from collections.abc import Iterable
@@ -310,6 +311,7 @@ def envelope(named: Designation, remedy: str = "add --bore, --outside and --widt
 HEAVY_RATIO = 2.56 / 1.92
 
 
+@functools.cache
 def diameter_series(bore: float, outside: float) -> str:
     """Diameter series of ISO 15 nearest to a ball bearing of this bore and outside diameter [mm]: "8", "9", "0", "2", "3" or "4".
 

@@ -258,14 +258,15 @@ def heat_at(scene: SingleRowScene, nodes: Array, seats: tuple[float, float] | No
 def balance(scene: SingleRowScene, nodes: Array, viscosity: Array | None = None) -> State:
     """The map of the fixed point: temperatures [C], and those at which the network carries off their heat.
 
-    ``viscosity``: ``log_viscosity`` of the oil, which takes longer than all else and may be known. Raises InputError as ``heat_at``.
+    ``viscosity``: ``log_viscosity`` of the oil where another scene has it, which takes longer than all else. Raises InputError as ``heat_at``.
     """
     assert scene.lubricant is not None
     found = heat_at(scene, nodes)
     films = np.zeros((len(TERMS), len(NODES)))
     films[:, OIL] = 1.0
     exponents = np.array([ROLLING_POWER * term.endswith("rolling_resistance") for term in TERMS])
-    viscosity = log_viscosity(scene.lubricant.at) if viscosity is None else viscosity
+    if viscosity is None:
+        viscosity = scene.once("log_viscosity", partial(log_viscosity, scene.lubricant.at))
     losses = Losses(nodes, found.powers, exponents, films, viscosity)
     model = HeatModel(losses, found.shares, found.conductances, found.boundaries, no_residue())
     image = temperatures(found.conductances, found.boundaries, found.heat)
@@ -287,10 +288,9 @@ STARVED = 0.1
 
 def slopes_at(scene: SingleRowScene, temperatures: Array) -> Array:
     """dM/dT (4, 4) by central differences. Raises InputError where the bearing is impossible next to these temperatures [C]."""
-    assert scene.lubricant is not None
-    columns, viscosity = [], log_viscosity(scene.lubricant.at)
+    columns = []
     for step in DIFFERENCE * np.eye(len(NODES)):
-        above, below = (balance(scene, temperatures + sign * step, viscosity).image for sign in (1.0, -1.0))
+        above, below = (balance(scene, temperatures + sign * step).image for sign in (1.0, -1.0))
         columns.append((above - below) / (2.0 * DIFFERENCE))
     return np.array(columns).T
 

@@ -242,7 +242,8 @@ class Law(NamedTuple):
         """Heat less what the network carries off, over a course."""
 
         def net(time: float, temperatures: Array) -> Array:
-            logarithms, running = course.logarithms(time), float(course.at(time)[0] > 0.0)
+            speed, load = course.at(time)
+            logarithms, running = course.logarithms_of(speed, load), float(speed > 0.0)
             weights = self.weights(temperatures, logarithms)
             powers = running * self.powers_at(temperatures, logarithms, weights)
             outflows = np.einsum("...knm,...m->...kn", self.matrices, temperatures) - self.sources
