@@ -61,7 +61,7 @@ LAST_STEP = 0.1
 
 # A search from a similar bearing finds the temperatures in the turns that do not count: usual and least turns of a part, most
 # further parts, the share of the first and of another part that counts in it, and turns that do not count after a small step.
-PART_TURNS, LEAST_PART, MORE_PARTS, LATE_SHARES, RESUMED_TURNS = 8.5, 4.0, 2, (0.4, 0.7), 3.0
+PART_TURNS, LEAST_PART, MORE_PARTS, LATE_SHARES, RESUMED_TURNS = 10.0, 4.0, 2, (0.4, 0.7), 3.0
 # Steps [K] of such a search: up to which the bearings are similar, and from which its slopes serve.
 SIMILAR, SMALL = 25.0, 3.0
 # Deviation [K] up to which its last step corrects the temperatures and the loss without another run: a tenth of it is an error.
@@ -316,10 +316,13 @@ def near_verdict(balance: Balance) -> Verdict | None:
 
 
 def _parts(scene: Scene) -> tuple[int, float]:
-    """Number and turns of the parts of a search from a similar bearing, which with the turns after them do not count."""
-    turns = scene.numerics.warm_up_turns - RESUMED_TURNS
+    """Number and turns of the parts of a search from a similar bearing.
+
+    One part and the turns after its step are the turns that do not count. A transient of more parts is slow, and goes on after the last step.
+    """
+    turns = scene.numerics.warm_up_turns
     number = max(round(turns / PART_TURNS), 1)
-    return number, max(turns / number, LEAST_PART)
+    return number, turns / number if number > 1 else max(turns - RESUMED_TURNS, LEAST_PART)
 
 
 def _part(length: float, late: float, scene: Scene) -> Scene:
