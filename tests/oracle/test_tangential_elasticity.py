@@ -164,11 +164,12 @@ def test_unit_nothing_jumps_at_touch():
 def test_unit_tightest_tolerance_passes_touch():
     """Unit: at the tolerance of a reference, contacts that open and close leave the steps far above their limit."""
     data = read_toml(ROOT / "tests" / "helpers" / "stiff_catalogue_bearing.toml")
-    scene = Scene.from_dict(data, "scene", (ELASTIC, "numerics.method=rk45"))
+    # With the films and the method of scenes by `rbdyn new`, which other tests compile.
+    scene = Scene.from_dict(data, "scene", (ELASTIC, "lubricant.inlet_distance=5.0", "numerics.method=rk43"))
     run = Run(scene, roller_bearing(scene), 0, 1e-12, Stop())
     run.to(0.1)
     steps = run.carry.counts[ACCEPTED]
-    assert run.carry.clock[NOW] == pytest.approx(0.1 * scene.turn_s) and 1000 < steps < 20_000
+    assert run.carry.clock[NOW] == pytest.approx(0.1 * scene.turn_s) and 1000 < steps < 50_000
 
 
 @given(

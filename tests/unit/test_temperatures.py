@@ -389,7 +389,8 @@ def test_unit_a_run_that_does_not_close_is_undecided(monkeypatch):
 def test_unit_a_cold_start_is_steady(oil, inlet):
     """Unit: cold oil has one stable state, warmer than its inlet; the search finds it, whatever the first guess, with a gain below one."""
     changes = {"lubricant": {**FLOW, "oil": oil, "oil_inlet_temperature_C": inlet}, "thermal": {"ambient_C": inlet}}
-    # The method that is chosen here: the choice would compile another one, for these laws alone.
+    # Traction and method that other tests compile: those of these oils, and the choice of a method, would be for this one alone.
+    changes["traction"] = {"model": "four_constant"}
     found = simulate(_scene(**changes, numerics={**SHORTER, "method": "rk43"}), workers=1, notice=None)
     assert found.status == "ok" and found.thermal.gain < 0.7
     assert min(figure.value - (figure.error or 0.0) for figure in found.temperatures_C.values()) > inlet
