@@ -56,6 +56,16 @@ class ElasticContact(NamedTuple):
     light_density: float  # 1/Q_l of the load up to which the state fades in [1/N]
 
 
+class StaggeredContact(NamedTuple):
+    """An elastic contact at the end of a step of ``verlet``: its states come without half a step of their rate at that end."""
+
+    start: int
+    shortest_time: float
+    damping_time: float
+    light_density: float
+    half_step: float  # [s]
+
+
 class SteadyTraction(NamedTuple):
     """Traction coefficient of the steady law, and its growth over the logarithm of the slip; 0 in a rigid contact, which needs none."""
 
@@ -80,7 +90,7 @@ def _(tangential, model, slip, load):
     return SteadyTraction(traction(model, slip, load), 0.0)
 
 
-@steady_traction.body(ElasticContact)
+@steady_traction.body(ElasticContact, StaggeredContact)
 def _(tangential, model, slip, load):
     return SteadyTraction(traction(model, slip, load), growth(model, slip, load))
 
@@ -95,7 +105,7 @@ def _(tangential, model, slip, load, value, slope):
     return SteadyTraction(traction_by_table(model, slip, load, value), 0.0)
 
 
-@steady_by_table.body(ElasticContact)
+@steady_by_table.body(ElasticContact, StaggeredContact)
 def _(tangential, model, slip, load, value, slope):
     steady = traction_by_table(model, slip, load, value)
     return SteadyTraction(steady, growth_by_table(model, slip, load, value, slope))
@@ -113,6 +123,25 @@ def _(tangential, steady, coefficient, load, slip, stiffness):
 
 @response.body(ElasticContact)
 def _(tangential, steady, coefficient, load, slip, stiffness):
+    return elastic_response(tangential, steady, coefficient, load, slip, stiffness)
+
+
+@response.body(StaggeredContact)
+def _(tangential, steady, coefficient, load, slip, stiffness):
+    # Rates are never steeper than 1/(w + beta), so the first try lies between the start and the end of the secant.
+    half, time = tangential.half_step, tangential.shortest_time + tangential.damping_time
+    start = elastic_response(tangential, steady, coefficient, load, slip, stiffness)
+    change = half * start.rate * time / (time + half)
+    tried = elastic_response(tangential, steady, coefficient + change, load, slip, stiffness)
+    share = (
+        half * start.rate / (change - half * (tried.rate - start.rate) + math.copysign(SMALLEST_COEFFICIENT, change))
+    )
+    return Response(start.coefficient + share * (tried.coefficient - start.coefficient), share * change / half)
+
+
+@kernel
+def elastic_response(tangential, steady, coefficient, load, slip, stiffness):
+    """``Response`` of an elastic contact, by the formulas of the module."""
     # Times are multiplied by the spring's rate: forces, so that one division gives all quotients.
     spring = max(stiffness * abs(slip), SMALLEST_SPRING_RATE)
     shortest, damping = tangential.shortest_time * spring, tangential.damping_time * spring
@@ -153,7 +182,7 @@ def _(tangential, y, j):
     return 0.0
 
 
-@coefficient_of.body(ElasticContact)
+@coefficient_of.body(ElasticContact, StaggeredContact)
 def _(tangential, y, j):
     return y[tangential.start + j]
 
@@ -168,7 +197,7 @@ def _(tangential, rate, lanes, place):
     pass
 
 
-@keep_coefficient_rate.body(ElasticContact)
+@keep_coefficient_rate.body(ElasticContact, StaggeredContact)
 def _(tangential, rate, lanes, place):
     lanes[place] = rate
 
@@ -183,7 +212,7 @@ def _(tangential, rate, j, row, dy):
     pass
 
 
-@add_coefficient_rate.body(ElasticContact)
+@add_coefficient_rate.body(ElasticContact, StaggeredContact)
 def _(tangential, rate, j, row, dy):
     dy[row, tangential.start + j] = rate
 
@@ -202,3 +231,45 @@ def _(tangential, rollers, y, row, dy):
 def _(tangential, rollers, y, row, dy):
     for j in range(rollers):
         dy[row, tangential.start + j] = faded(tangential, y[tangential.start + j])
+
+
+@relax_coefficients.body(StaggeredContact)
+def _(tangential, rollers, y, row, dy):
+    time = tangential.shortest_time + tangential.damping_time + tangential.half_step
+    for j in range(rollers):
+        dy[row, tangential.start + j] = -y[tangential.start + j] / time
+
+
+@law
+def staggered(tangential, half_step):
+    """The law at the end of a step of twice ``half_step`` [s]."""
+
+
+@staggered.body(RigidContact)
+def _(tangential, half_step):
+    return tangential
+
+
+@staggered.body(ElasticContact)
+def _(tangential, half_step):
+    return StaggeredContact(
+        tangential.start, tangential.shortest_time, tangential.damping_time, tangential.light_density, half_step
+    )
+
+
+@law
+def half_step_ahead(tangential, rollers, half_step, y, dy, row, end):
+    """Write the coefficients of ``y`` half a step [s] later, by their rates in row ``row`` of ``dy``, to ``end``."""
+
+
+@half_step_ahead.body(RigidContact)
+def _(tangential, rollers, half_step, y, dy, row, end):
+    pass
+
+
+@half_step_ahead.body(ElasticContact)
+def _(tangential, rollers, half_step, y, dy, row, end):
+    # Coefficients of open contacts die away to numbers so small that processors are slow with them.
+    for i in range(tangential.start, tangential.start + rollers):
+        ahead = y[i] + half_step * dy[row, i]
+        end[i] = ahead if abs(ahead) > SMALLEST_COEFFICIENT else 0.0

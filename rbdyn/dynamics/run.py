@@ -1,6 +1,6 @@
 """One replicate under way: its integrator, its memory and where it is; and the choice of its method.
 
-An explicit pair integrates a run, or the linearly implicit method where stability limits the steps. A step of that method
+An explicit method integrates a run, or the linearly implicit method where stability limits the steps. A step of that method
 costs about nine explicit ones, so it pays only where it can be much longer. "auto" tries both on a copy of the run over
 the same stretch and counts right-hand sides. It reads no clock, so equal scenes choose alike.
 """
@@ -185,7 +185,7 @@ def prepare(scene: Scene, bearing: RollerBearing) -> float:
     return time.perf_counter() - started
 
 
-EXPLICIT = ("rk45", "rk43")
+EXPLICIT = ("rk45", "rk43", "verlet")
 # From this tolerance on the third-order error estimate of Kutta's pair costs fewer right-hand sides than the fifth order saves.
 # There is no trial, which would compile both.
 KUTTA_FROM = 5e-3
@@ -202,7 +202,7 @@ IMPLICIT_OVERHEAD = 3.0
 
 
 def explicit_method(method: str, rtol: float) -> str:
-    """The explicit pair that a scene of this method and tolerance starts with, "rk45" or "rk43".
+    """The explicit method that a scene of this method and tolerance starts with: the one it names, else "rk45" or "rk43".
 
     For the bearing of Chen et al. 2022 rk43 at 1e-2 takes 1890 right-hand sides a turn, rk45 2510 at 1e-3, the loosest at
     which it is free of bias; at 1e-3 rk43 takes 3590.
@@ -213,7 +213,7 @@ def explicit_method(method: str, rtol: float) -> str:
 
 
 def method_of(name: str, scene: Scene, bearing: RollerBearing) -> Any:
-    """The method "rk45", "rk43" or "rosenbrock" for this bearing."""
+    """The method "rk45", "rk43", "verlet" or "rosenbrock" for this bearing."""
     if name == "rosenbrock":
         if scene.traction.elasticity:
             raise MethodError(
@@ -222,6 +222,10 @@ def method_of(name: str, scene: Scene, bearing: RollerBearing) -> Any:
         from rbdyn.dynamics.integrators.rosenbrock import rodas
 
         return rodas(layout_of(scene), bearing, increments(scene, bearing))
+    if name == "verlet":
+        from rbdyn.dynamics.integrators.verlet import Verlet
+
+        return Verlet(2 * bearing.rollers)
     return Kutta() if name == "rk43" else DormandPrince()
 
 

@@ -103,7 +103,7 @@ def test_unit_companions_follow_the_steps(make_scene, outer):
     slow = make_scene(*SLOW)
     light = light_contact(slow)
     assert light.frequency == pytest.approx(1.69e5, rel=0.01) and light_contact(outer) is None
-    for method in DAMPING_SCALE:
+    for method in DAMPING_SCALE.keys() - {"verlet"}:
         limit = longest_step(light, NOTABLE_DAMPING * light.damping, method)
         assert numerical_damping(light, limit, method) == pytest.approx(NOTABLE_DAMPING * light.damping)
         found = companions_of(slow, runs_with(slow, 1.05 * limit, method))
@@ -113,6 +113,7 @@ def test_unit_companions_follow_the_steps(make_scene, outer):
             resolved_damping(1.05**5 * NOTABLE_DAMPING * light.damping, light.damping), rel=1e-4
         )
         assert companions_of(slow, runs_with(slow, 0.95 * limit, method)) == usual_companions(slow)
+    assert companions_of(slow, runs_with(slow, 1e-5, "verlet")) == usual_companions(slow)
     assert companions_of(outer, runs_with(outer, 1.0)) == usual_companions(outer)
     assert usual_companions(slow).longest_step == math.inf
 

@@ -30,8 +30,8 @@ from rbdyn.dynamics.forces.race_samples import book_races
 from rbdyn.losses import POWERS
 
 # Places in ``Carry.clock``: time, next step, next sample time [s], error of the last step over the tolerance, rate of the
-# frame [rad/s], next time of the trace and of the samples of the races [s].
-NOW, STEP, ERROR, SAMPLE, FRAME, TRACED, RACES, CLOCK = range(8)
+# frame [rad/s], next time of the trace and of the samples of the races [s], size of the step before [s].
+NOW, STEP, ERROR, SAMPLE, FRAME, TRACED, RACES, BEFORE, CLOCK = range(9)
 # In ``Carry.counts``: steps, right-hand sides, and the component that made the last step impossible.
 ACCEPTED, REJECTED, DERIVATIVES, WORST, COUNTS = range(5)
 # In ``Carry.stiffness``: steps tested, those that stability limits, sum of their |eigenvalue| [1/s].
@@ -158,6 +158,21 @@ def after_accepted(method, clock, h, cut, error, refused, largest_step):
 def shortened(method, h, error):
     """Step [s] in place of one of ``h`` that was refused."""
     return h * (max(SAFETY * rough_power(error, -method.rejected), SHRINK) if math.isfinite(error) else SHRINK)
+
+
+@kernel
+def row_sum(k, row, n):
+    """Sum of a row: four sums side by side, in an order that no compiler chooses."""
+    vectors = n // 4 * 4
+    sum_0 = sum_1 = sum_2 = sum_3 = 0.0
+    for i in range(0, vectors, 4):
+        sum_0 += k[row, i]
+        sum_1 += k[row, i + 1]
+        sum_2 += k[row, i + 2]
+        sum_3 += k[row, i + 3]
+    for i in range(vectors, n):
+        sum_0 += k[row, i]
+    return (sum_0 + sum_1) + (sum_2 + sum_3)
 
 
 @routine

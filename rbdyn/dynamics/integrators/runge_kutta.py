@@ -324,21 +324,12 @@ def _(pair, refused, bearing, y, k, stage, power, loads, scratch, clock, counts,
 
 @laws.error_norm.body(*PAIRS)
 def _(pair, k, h, inverse_tolerance):
-    # Squares in vectors, into a row that is free; then four sums side by side, in an order that no compiler chooses.
+    # Squares in vectors, into a row that is free.
     n, squares = inverse_tolerance.size, pair.free
     for i in range(n):
         e = rate_error(pair, k, i) * inverse_tolerance[i]
         k[squares, i] = e * e
-    vectors = n // 4 * 4
-    sum_0 = sum_1 = sum_2 = sum_3 = 0.0
-    for i in range(0, vectors, 4):
-        sum_0 += k[squares, i]
-        sum_1 += k[squares, i + 1]
-        sum_2 += k[squares, i + 2]
-        sum_3 += k[squares, i + 3]
-    for i in range(vectors, n):
-        sum_0 += k[squares, i]
-    return h * math.sqrt((sum_0 + sum_1) + (sum_2 + sum_3))
+    return h * math.sqrt(laws.row_sum(k, squares, n))
 
 
 @laws.step_error.body(*PAIRS)
