@@ -23,11 +23,6 @@ if TYPE_CHECKING:
     from doe.workflow.problem import Asked, Problem
 
 
-def notes_record(notes: Notes) -> dict[str, Any]:
-    """The JSON key of notes, where there are any."""
-    return {"notes": plain(notes)} if notes else {}
-
-
 @dataclass(frozen=True, repr=False, eq=False)
 class DesignAnswer(Answer):
     """The runs of a design and its quality. Tables: "runs" (actual values in the units of the factors), "coded", "terms"."""
@@ -159,7 +154,8 @@ def fit(
         stack.enter_context(registered(study.path, folder))
         study, reading = _surfaces(study, table, folder, Effort(workers, scheduler, retry, progress, notice))
         surfaces = with_rivals(study.surfaces)
-        record = fits_of(surfaces).as_dict() | notes_record((*reading, *notes, *unrivalled(surfaces)))
+        notes = (*reading, *notes, *unrivalled(surfaces))
+        record = fits_of(surfaces).as_dict() | ({"notes": plain(notes)} if notes else {})
         columns = (
             f"{table}: factors {', '.join(study.factors)}; responses {', '.join(study.responses)}; coded -1 and +1 are the ends "
             "of a factor's range"

@@ -133,14 +133,9 @@ def read_rexs(path: Path, bearing: str | None = None) -> RexsBearing:
         chosen = found
     parts = [components[number] for number in inside.get(chosen[0].number, ()) if number in components]
     oils = [component for component in components.values() if component.kind == "lubricant"]
-    return _read(path, chosen[0], [*parts, *_second(parts, components, inside), *(oils if len(oils) == 1 else ())])
-
-
-def _second(
-    parts: Sequence[Component], components: Mapping[str, Component], inside: Mapping[str, list[str]]
-) -> list[Component]:
-    """Parts of the parts: rolling elements of a row."""
-    return [components[number] for part in parts for number in inside.get(part.number, ()) if number in components]
+    # Parts of the parts: rolling elements of a row.
+    smaller = [components[number] for part in parts for number in inside.get(part.number, ()) if number in components]
+    return _read(path, chosen[0], [*parts, *smaller, *(oils if len(oils) == 1 else ())])
 
 
 def _components(path: Path) -> tuple[dict[str, Component], dict[str, list[str]]]:
