@@ -23,6 +23,7 @@ from rbdyn.base.identity import identity_of
 from rbdyn.base.notes import Note
 from rbdyn.base.streams import escaped
 from rbdyn.base.workbook import write_workbook
+from rbdyn.compiled.kernel import cache_folder
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 BALL = EXAMPLES / "angular_contact_ball.toml"
@@ -50,6 +51,10 @@ def test_a_variable_that_ends_a_library_is_a_sentence(command, monkeypatch, vari
 def test_a_process_without_home_or_picture_window_says_nothing_of_it(tmp_path):
     line = [sys.executable, "-m", "rbdyn", "ball", str(BALL), "--out", str(tmp_path / f"out{EVIL[:5]}"), "-q"]
     bare = {name: value for name, value in os.environ.items() if name not in ("HOME", "XDG_CACHE_HOME")}
+    # Compiled code alone is taken from where it is: a process without a folder for it compiles for seconds.
+    folder = cache_folder()
+    assert folder is not None
+    bare["NUMBA_CACHE_DIR"] = str(folder.parents[1])
     shown = subprocess.run(
         line, capture_output=True, text=True, env={**bare, "HOME": "/nowhere", "MPLBACKEND": "nonsense"}
     )
