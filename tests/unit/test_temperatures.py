@@ -59,6 +59,13 @@ def hot() -> SimulationResult:
     return simulate(_scene(), workers=1, notice=None)
 
 
+@pytest.fixture(scope="module")
+def similar() -> SimulationResult:
+    """As ``hot``, but of runs long enough to begin the search of another bearing."""
+    numerics = {**SHORT, "turns": 10.0, "discard_turns": 5.0, "impact_window_turns": 5.0}
+    return simulate(_scene(numerics=numerics), workers=1, notice=None)
+
+
 def test_unit_heat_in_is_heat_out(hot):
     """Unit: losses and windage heat the nodes, all of it leaves, and the temperatures are those of a plain iteration."""
     balance = hot.thermal
@@ -448,12 +455,12 @@ def _near(result: SimulationResult, **changes: Any) -> dict[str, Any]:
 
 
 @pytest.mark.parametrize(("discarded", "needed"), [(7.0, 7.0), (20.0, 23.0)])
-def test_unit_a_search_from_a_similar_bearing_needs_no_turn_of_its_own(hot, discarded, needed):
+def test_unit_a_search_from_a_similar_bearing_needs_no_turn_of_its_own(similar, discarded, needed):
     """Unit: it finds the same temperatures and figures within their errors, in the turns of the transient, by any number of threads; a slow one goes on."""
     numerics = {**SHORT, "turns": 20.0, "discard_turns": discarded, "companion": False, "impact_window_turns": 5.0}
     changes = {"numerics": numerics, "bearing": {"radial_clearance_mm": 0.024}, "cage": {"guide_clearance_mm": 0.18}}
     far = simulate(_scene(**changes), workers=1, notice=None)
-    near = simulate(_scene(**changes, thermal={"near": _near(hot)}), workers=1, notice=None)
+    near = simulate(_scene(**changes, thermal={"near": _near(similar)}), workers=1, notice=None)
     assert near.status == "ok" and near.thermal.status == "steady"
     turns = numerics["replicates"] * (needed + numerics["turns"])
     assert near.cost["turns"] == pytest.approx(turns) and near.cost["turns"] < 0.5 * far.cost["turns"]
@@ -461,7 +468,7 @@ def test_unit_a_search_from_a_similar_bearing_needs_no_turn_of_its_own(hot, disc
         other = near.temperatures_C[node]
         assert abs(other.value - figure.value) <= 1.5 * math.hypot(figure.error, other.error) + 0.02
     assert near.power_loss_W.value == pytest.approx(far.power_loss_W.value, rel=3e-3)
-    again = simulate(_scene(**changes, thermal={"near": _near(hot)}), workers=2, notice=None)
+    again = simulate(_scene(**changes, thermal={"near": _near(similar)}), workers=2, notice=None)
     records = [result.as_dict() for result in (near, again)]
     for record in records:
         del record["cost"]
