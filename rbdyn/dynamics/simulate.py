@@ -124,7 +124,7 @@ def _ensemble(
 ) -> tuple[Ensemble, dict[str, float]]:
     """Replicates of a scene with its parameters, from ``starts`` where these are given, and the time [s] that they took."""
     compile_s = 0.0
-    method = scene.numerics.method, explicit_method(scene.numerics.method, scene.numerics.rtol)
+    method = scene.numerics.method, explicit_method(scene)
     if (laws := (method, _types(bearing))) not in _prepared:
         compile_s = prepare(scene, bearing)
         _prepared.add(laws)
