@@ -32,8 +32,8 @@ if TYPE_CHECKING:
     from rbdyn.base.estimate import Estimate
 
 
-# Largest share of a minor point over that of the main one: its noise counts by the square.
-MINOR = 0.25
+# Parts of the replicates of minor points, which are in proportion to their share over that of the main one: so the mean is known best.
+PARTS = (4, 2)
 # Figures whose mean over time is that of their inverse.
 HARMONIC = {figure.key for figure in FIGURES if figure.harmonic}
 
@@ -134,14 +134,18 @@ class Duty(Record):
         return max(self.shares, key=lambda name: self.shares[name])
 
     @property
-    def minor(self) -> set[tuple[str, ...]]:
-        """Overrides of points with a small share of the time, whose noise hardly counts where all goals are means over it."""
+    def minor(self) -> dict[tuple[str, ...], int]:
+        """By overrides of points with a small share of the time, the part of the replicates that they have where all goals are means over it."""
         if any(rule.aggregate != "mean" for rule in self.rules.values() if rule.goal != "none"):
-            return set()
+            return {}
         shares = defaultdict[tuple[str, ...], float](float)
         for name, overrides in self.overrides.items():
             shares[tuple(overrides)] += self.shares[name]
-        return {overrides for overrides, share in shares.items() if share <= MINOR * max(shares.values())}
+        most = max(shares.values())
+        parts = {
+            overrides: next((part for part in PARTS if part * share <= most), 1) for overrides, share in shares.items()
+        }
+        return {overrides: part for overrides, part in parts.items() if part > 1}
 
     @property
     def columns(self) -> list[str]:

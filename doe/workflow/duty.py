@@ -24,6 +24,9 @@ from rbdyn.life import DutyLife, DutyLifeFigures
 from rbdyn.result import arrays_of
 from rbdyn.scene import Scene
 
+# Most generations of the search for the pick of a point alone, of which no run is made.
+GENERATIONS = 50
+
 
 class OwnPick(Record):
     """The pick at a point of the duty alone by factor, its responses on the surfaces of the point, and why it is.
@@ -165,7 +168,8 @@ def study_at(study: Problem, name: str) -> Problem:
         if response.aggregate == "worst_relative" and response.goal == "target":
             changes |= {"goal": "none", "target": None}
         responses.append(response.model_copy(update=changes))
-    front = study.file.front.model_copy(update={"tolerance_aware": "none"})
+    front = study.file.front
+    front = front.model_copy(update={"tolerance_aware": "none", "generations": min(front.generations, GENERATIONS)})
     return study.with_file(response=responses, duty=[], front=front)
 
 

@@ -227,20 +227,20 @@ class Problem(Study):
         return RunPlan(design, actual, scenes, labels, [self.by_factor(point) for point in actual])
 
     def _design_run(self, point: Array, seed: int, replicates: int | None = None) -> Run:
-        """Scenes of a design run, with all their replicates unless another number is given, of which minor points have half."""
+        """Scenes of a design run, with all their replicates unless another number is given, of which minor points have a part."""
 
         def scene(overrides: Sequence[str]) -> Scene:
             count = replicates
-            if count is not None and self._is_minor(overrides):
-                count = max(count // 2, 2)
+            if count is not None and (part := self._part_of(overrides)) > 1:
+                count = max(count // part, 2)
             effort = [] if count is None else [f"numerics.replicates={count}"]
             return self._scene_in_region(point, seed, [*overrides, *effort])
 
         return self._begun(self.over_duty(scene, self.baseline_scenes))
 
-    def _is_minor(self, overrides: Sequence[str]) -> bool:
-        """Whether the point of the duty with these overrides has half of the replicates; none where all judge the class of the cage."""
-        return self.duty is not None and not self.file.limits.classes and tuple(overrides) in self.duty.minor
+    def _part_of(self, overrides: Sequence[str]) -> int:
+        """The part of the replicates that the point of the duty with these overrides has: 1 where all judge the class of the cage."""
+        return 1 if self.duty is None or self.file.limits.classes else self.duty.minor.get(tuple(overrides), 1)
 
     @cached_property
     def usual_run(self) -> Run:
@@ -409,10 +409,10 @@ class Problem(Study):
     def _confirmation_scene(self, point: Array, sets: Sequence[str], in_brief: bool = False) -> Scene:
         settings, seed = self.file.confirmation, self.file.design.seed + CONFIRMATION_SEEDS
         replicates = min(self.first_replicates, settings.replicates) if in_brief else settings.replicates
-        if (minor := self._is_minor(sets)) or (in_brief and self.file.limits.classes):
+        if (part := self._part_of(sets)) > 1 or (in_brief and self.file.limits.classes):
             # A class of the cage needs some replicates alike.
-            fewest = 2 if minor and in_brief else main_scene(self.usual_run).verdict.limits.fewest_replicates
-            replicates = max(replicates // 2 if minor else replicates, min(settings.replicates, fewest))
+            fewest = 2 if part > 1 and in_brief else main_scene(self.usual_run).verdict.limits.fewest_replicates
+            replicates = max(replicates // part, min(settings.replicates, fewest))
         effort = [f"numerics.replicates={replicates}", f"numerics.companion={str(not in_brief).lower()}"]
         scene = self.scene_at(point, seed, [*sets, *effort, *settings.set], confirms=True)
         needed = scene.verdict.limits.fewest_replicates

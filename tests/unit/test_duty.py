@@ -162,10 +162,16 @@ def test_every_point_of_a_run_has_its_seed(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("idle", "aggregate", "replicates"), [(0.2, "mean", [2, 4]), (0.2, "worst_relative", [4, 4]), (0.3, "mean", [4, 4])]
+    ("idle", "aggregate", "replicates", "confirmed_with"),
+    [
+        (0.2, "mean", [2, 4], 6),
+        (0.3, "mean", [2, 4], 8),
+        (0.2, "worst_relative", [4, 4], 16),
+        (0.4, "mean", [4, 4], 16),
+    ],
 )
-def test_minor_points_have_half_of_the_replicates(tmp_path, idle, aggregate, replicates):
-    """Unit: a point with at most a quarter of the main share, where all goals are means; confirmed ones still name a class."""
+def test_minor_points_have_a_part_of_the_replicates(tmp_path, idle, aggregate, replicates, confirmed_with):
+    """Unit: a half or a quarter, as their share over the main one, where all goals are means; confirmed ones still name a class."""
     duty = IDLE_AND_CRUISE.replace("0.25", str(idle)).replace("0.75", str(1.0 - idle))
     study = duty_study(
         tmp_path, duty, (IMPACT, f'{IMPACT}aggregate = "{aggregate}"\n'), ("replicates=2", "replicates=8")
@@ -174,7 +180,12 @@ def test_minor_points_have_half_of_the_replicates(tmp_path, idle, aggregate, rep
     for further in (False, True):
         for run in study.design_scenes(study.plan.actual, study.design.order.tolist(), further=further):
             assert [run.scenes[name].numerics.replicates for name in ("idle", "cruise")] == replicates
-    for count, is_brief, every, half in ((16, False, 16, 8), (8, False, 8, 6), (2, False, 2, 2), (16, True, 4, 2)):
+    for count, is_brief, every, half in (
+        (16, False, 16, confirmed_with),
+        (8, False, 8, 6),
+        (2, False, 2, 2),
+        (16, True, 4, 2),
+    ):
         asked = study.with_file(confirmation=study.file.confirmation.model_copy(update={"replicates": count}))
         confirmed = asked.confirmation_run(asked.baseline, in_brief=is_brief).scenes
         expected = [half if replicates[0] < replicates[1] else every, every]
@@ -186,7 +197,7 @@ def test_equal_points_are_minor_by_their_share_together():
     rule = Rule("mean", "min", None)
     shares = {"cruise": 0.6, "idle": 0.15, "wait": 0.15, "take-off": 0.1}
     overrides = {"cruise": [], "idle": ["a=1"], "wait": ["a=1"], "take-off": ["a=2"]}
-    assert Duty(shares, overrides, {"power_loss_W": rule}).minor == {("a=2",)}
+    assert Duty(shares, overrides, {"power_loss_W": rule}).minor == {("a=1",): 2, ("a=2",): 4}
 
 
 def test_the_optimum_of_the_mean_lies_between_those_of_the_points(tmp_path, monkeypatch):
