@@ -106,13 +106,17 @@ class Run:
             1.0 / absolute_tolerance(self.scene, self.bearing, self.rtol, method),
             SMALLEST_STEP_TURNS * self.scene.turn_s,
             min(LARGEST_STEP_TURNS * self.scene.turn_s, self.longest_step),
-            int(min(numerics.step_budget_per_turn * math.ceil(turns), 2**62)),
+            self._budget(turns),
         )
 
     def allow(self, turns: float) -> None:
         """Raise the budget of steps to that of so many shaft turns since the start."""
-        budget = int(min(self.scene.numerics.step_budget_per_turn * math.ceil(turns), 2**62))
-        self.control = self.control._replace(step_budget=max(self.control.step_budget, budget))
+        self.control = self.control._replace(step_budget=max(self.control.step_budget, self._budget(turns)))
+
+    def _budget(self, turns: float) -> int:
+        """Steps that so many shaft turns may take; six of Verlet cost as much as one of Dormand and Prince."""
+        steps = self.scene.numerics.step_budget_per_turn * (6 if self.explicit == "verlet" else 1)
+        return int(min(steps * math.ceil(turns), 2**62))
 
     def to(self, turns: float) -> None:
         """Advance to a time given in shaft turns since the start. Raises RunError or CancelledError."""

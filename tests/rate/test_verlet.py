@@ -249,3 +249,10 @@ def test_invariant_workers_change_nothing(make_scene):
     """Invariant: the same bits whatever the number of workers."""
     one, two = (simulate(make_scene(VERLET, ELASTIC), workers=workers) for workers in (1, 2))
     assert one.impact_force_N == two.impact_force_N and one.power_loss_W == two.power_loss_W
+
+
+def test_unit_budget_counts_right_hand_sides(outer):
+    """Unit: six steps of one right-hand side have the budget of one of Dormand and Prince's pair, which has six."""
+    verlet_run, pair_run = (run_of(outer, 1e-2, method) for method in ("verlet", "rk45"))
+    verlet_run.allow(7.0), pair_run.allow(7.0)
+    assert verlet_run.control.step_budget == 6 * pair_run.control.step_budget > 0
