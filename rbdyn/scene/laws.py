@@ -255,9 +255,9 @@ class Numerics(Consistent, Sparse):
     """Compute the stiffness by static loads after the runs: some 20 ms, nine times as long with a heat balance. A study
     computes it only if it names one of its results."""
     step_budget_per_turn: Annotated[int, Field(ge=100)] = 100_000
-    """Largest number of steps in a shaft turn before a run fails, with place and reason; six times as many of verlet, whose steps cost
-    a sixth. With 10 rollers in one slice the default takes about 1 s a turn (8 us a step on one core). With 80 rollers in 31 slices
-    it takes 14 s (0.14 ms a step)."""
+    """Largest number of steps in a shaft turn before a run fails, with place and reason. Verlet may take six times as many, as its
+    steps cost a sixth. With 10 rollers in one slice the default takes about 1 s a turn (8 us a step on one core). With 80 rollers
+    in 31 slices it takes 14 s (0.14 ms a step)."""
 
     @property
     def warm_up_turns(self) -> float:
