@@ -207,7 +207,7 @@ def choose(
         if any(np.array_equal(points["pick"].point, point.point) for point in tried):
             break
         try:
-            confirmed, _ = confirm(study, baseline, {"pick": points["pick"]}, simulations)
+            found = _judged(study, baseline, points["pick"], simulations)
         except LostPickError:
             # Its run failed like those of the design: the front stays away from there.
             lost += 1
@@ -216,17 +216,17 @@ def choose(
             study = _without(study, points["pick"].point)
             front = find_front(study, simulated, len(trials))
             continue
-        trials.append((confirmed["pick"], front, candidate))
-        kept.append(verdict_of(limits_of(study, confirmed["pick"])) == "kept")
+        trials.append((found, front, candidate))
+        kept.append(verdict_of(limits_of(study, found)) == "kept")
         # Where the closest point keeps its limits, so may points of a front.
         is_closest = front.violations is not None and searched is None and kept[-1] and sum(kept) == 1
         if len(trials) == study.file.confirmation.tries or (any(kept) and not is_closest):
             break
-        if verdict_of(class_limits(study, confirmed["pick"])) != "kept":
+        if verdict_of(class_limits(study, found)) != "kept":
             # No surface has a class: the front stays away from there.
             study = _without(study, points["pick"].point)
         if searched is None:
-            tried.append(confirmed["pick"])
+            tried.append(found)
             front = find_front(study, [baseline, *tried], kept.count(False))
             if front.violations is not None and (any(kept) or not _promises_less(study, front, tried)):
                 break
@@ -236,12 +236,31 @@ def choose(
     )
     pick, front, candidate = trials[best]
     points = choices(study, front, searched, candidate)
-    for number, (point, _, _) in enumerate(trials, 1):
-        if point is not pick:
-            points[f"{TRY}{number}"] = Choice(point.point, f"try {number} for the selected design: {point.reason}")
-    points["pick"] = Choice(pick.point, pick.reason)
-    confirmed, failures = confirm(study, baseline, points, simulations)
+    del points["pick"]
+    others, failures = confirm(study, baseline, points, simulations)
+    tries = {
+        f"{TRY}{number}": replace(point, reason=f"try {number} for the selected design: {point.reason}")
+        for number, (point, _, _) in enumerate(trials, 1)
+        if point is not pick
+    }
+    confirmed = {"baseline": baseline, "pick": pick} | others | tries
     return Selection(front, candidate, confirmed, failures, len(trials))
+
+
+def _judged(study: Problem, baseline: Confirmed, choice: Choice, simulations: Simulations) -> Confirmed:
+    """The simulated pick, by twice the replicates where its own leave a limit undecided: they tell more than another point.
+
+    Raises as ``confirm``.
+    """
+    found = confirm(study, baseline, {"pick": choice}, simulations)[0]["pick"]
+    if verdict_of(limits_of(study, found)) != "undecided":
+        return found
+    settings = study.file.confirmation
+    more = study.with_file(confirmation=settings.model_copy(update={"replicates": 2 * settings.replicates}))
+    reason = (
+        f"{choice.reason}; by {2 * settings.replicates} replicates, as {settings.replicates} left a limit undecided"
+    )
+    return confirm(more, baseline, {"pick": replace(choice, reason=reason)}, simulations)[0]["pick"]
 
 
 def _promises_less(study: Problem, front: ParetoFront, simulated: Sequence[Confirmed]) -> bool:

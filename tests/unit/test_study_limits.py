@@ -113,6 +113,29 @@ def test_a_pick_that_misses_is_followed_by_the_next_best_until_one_keeps_the_lim
     assert told["verdict"] == "kept" and told["bound"] == 35.0 and {"value", "error"} <= set(told)
 
 
+def test_a_limit_left_undecided_is_judged_by_twice_the_replicates(tmp_path, monkeypatch):
+    """A wide interval about a pick that keeps its limit costs replicates of this pick, not another try farther from the limit."""
+    instantly(monkeypatch.setattr)
+    from rbdyn.dynamics import simulate as module
+
+    usual, replicates = module.simulate, []
+
+    def simulate(scene, *rest, **more):
+        result = usual(scene, *rest, **more).as_dict()
+        if scene.numerics.seed >= clearance.CONFIRMATION_SEEDS:
+            replicates.append(scene.numerics.replicates)
+            result["impact_force_N"] |= {"value": 34.0, "statistical_error": 20.0 / scene.numerics.replicates}
+        return type(usual(scene, *rest, **more)).from_dict(result)
+
+    monkeypatch.setattr(module, "simulate", simulate)
+    unillustrated(monkeypatch.setattr)
+    study = Problem.load(limited_study(tmp_path, more=[("\nreplicates = 2", "\nreplicates = 10")]))
+    outcome = run_study(study, tmp_path, 1, lambda title: silent)
+    assert (outcome.verdict, outcome.tries) == ("kept", 1) and replicates.count(20) == 1
+    assert outcome.pick.reason.endswith("; by 20 replicates, as 10 left a limit undecided")
+    assert outcome.limits[0].error == pytest.approx(1.0, rel=0.1) and "try_1" not in outcome.confirmed
+
+
 def test_a_broken_limit_warns_before_gains_and_fails_the_study_also_when_asked_again(tmp_path, monkeypatch):
     biased(monkeypatch.setattr, 30.0)
     path = limited_study(tmp_path, more=[("tries = 4", "tries = 2")])
