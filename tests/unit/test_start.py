@@ -216,7 +216,7 @@ def test_slow_warm_up_keeps_more_clearance(cold):
 @pytest.mark.slow
 def test_tight_cage_seizes_during_the_start():
     """Verdict: a cage with guide clearance enough when steady, whose land stays cold in winter, seizes at a stated moment."""
-    seized = simulate(_scene(start={"from_C": -20.0}, cage={"guide_clearance_mm": 0.075}), workers=2, notice=None)
+    seized = simulate(_scene(start={"from_C": -20.0}, cage={"guide_clearance_mm": 0.073}), workers=2, notice=None)
     start = seized.start
     assert seized.thermal.status == "steady" and seized.clearance_um["guide"]["operating"] > 20.0
     assert seized.status == start.status == "seizure" and "the guide clearance of the cage is lost" in start.reason
