@@ -2,8 +2,8 @@
 
 With one right-hand side a staggered step of a vibration is stable up to h omega = 2, and up to 1.4 with a damping ratio of 0.1. A
 step of Kutta's pair reaches 2.8 with four. So Verlet is the cheaper explicit method where stability limits the steps: in
-bearings whose loaded contacts are stiff, above all with tangential elasticity. With a = a(x, v) and the rates a_0, a_1 at both ends of a step and a_-1 at the start of the
-step before,
+bearings whose loaded contacts are stiff, above all with tangential elasticity. With a = a(x, v) and the rates a_0, a_1 at both
+ends of a step and a_-1 at the start of the step before,
 
     x_1 = x_0 + h v_0 + h^2/2 a_0,   v* = v_0 + h a_0 + h/2 (a_0 - a_-1),   a_1 = a(x_1, v*),   v_1 = v_0 + h/2 (a_0 + a_1)
 
