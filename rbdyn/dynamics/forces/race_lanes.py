@@ -147,16 +147,7 @@ def runs_in_vectors(race):
 @kernel
 def lane_race(race):
     """A race as lanes read it, numbers alone: references to arrays would be counted in every lane."""
-    return races.Race(
-        race.radius,
-        race.reach,
-        race.form,
-        race.contact,
-        race.damping,
-        without_table(race.traction),
-        race.rolling,
-        race.tangential,
-    )
+    return races.with_laws(race, without_table(race.traction), race.tangential)
 
 
 @kernel

@@ -108,6 +108,12 @@ class Race(NamedTuple):
     tangential: Any
 
 
+@kernel
+def with_laws(race, traction, tangential):
+    """The race with other laws of traction."""
+    return Race(race.radius, race.reach, race.form, race.contact, race.damping, traction, race.rolling, tangential)
+
+
 class EqualRollers(NamedTuple):
     """Rollers of one radius [m]."""
 

@@ -32,7 +32,7 @@ from rbdyn.contact.tangential import half_step_ahead, staggered
 from rbdyn.dynamics.forces import state
 from rbdyn.dynamics.forces.bodies import HeldRing, SupportedRing
 from rbdyn.dynamics.forces.equations import RollerBearing, derivative, derivative_once, roller_count
-from rbdyn.dynamics.forces.races import Race
+from rbdyn.dynamics.forces.races import with_laws
 from rbdyn.dynamics.integrators import advance as laws
 from rbdyn.dynamics.integrators.advance import BEFORE, DERIVATIVES, EIGENVALUES, GROW, LIMITED, STEP, TESTED
 
@@ -63,16 +63,7 @@ class Verlet(NamedTuple):
 @kernel
 def staggered_race(race, half_step):
     """A race at the end of a step of twice ``half_step`` [s]."""
-    return Race(
-        race.radius,
-        race.reach,
-        race.form,
-        race.contact,
-        race.damping,
-        race.traction,
-        race.rolling,
-        staggered(race.tangential, half_step),
-    )
+    return with_laws(race, race.traction, staggered(race.tangential, half_step))
 
 
 @kernel
