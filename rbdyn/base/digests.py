@@ -21,7 +21,8 @@ _TYPING = re.compile(r"^if TYPE_CHECKING:\n(?:[ \t]+.*\n|\n)+", re.MULTILINE)
 _IMPORT = re.compile(r"^[ \t]*from ([\w.]+) import (\([^)]*\)|.*)$", re.MULTILINE)
 # Mark of a module with kernels: an import of their decorators, or a body of a law.
 _KERNELS = re.compile(
-    r"^from rbdyn\.compiled\.kernel import .*\b(?:entry|\w*kernel|law|routine|INLINED)\b|^@[\w.]+\.body\(", re.MULTILINE
+    r"^from rbdyn\.compiled\.kernel import .*\b(?:entry|\w*kernel|law|law_of|routine|INLINED)\b|^@[\w.]+\.body\(",
+    re.MULTILINE,
 )
 
 

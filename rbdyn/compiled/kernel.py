@@ -182,6 +182,17 @@ def law(declaration: Callable[..., Any]) -> Any:
     return choice
 
 
+def law_of(*parameter_types: type) -> Callable[[Callable[..., Any]], Any]:
+    """Declare a law whose declaration is its body for these parameter types; one without code does nothing and returns None."""
+
+    def declare(declaration: Callable[..., Any]) -> Any:
+        choice = law(declaration)
+        choice.body(*parameter_types)(declaration)
+        return choice
+
+    return declare
+
+
 def _leaves(form: Any) -> list[types.Type]:
     if isinstance(form, types.NamedTuple | types.NamedUniTuple):
         return [leaf for field in form.types for leaf in _leaves(field)]

@@ -3,7 +3,7 @@
 import math
 from typing import NamedTuple
 
-from rbdyn.compiled.kernel import law
+from rbdyn.compiled.kernel import law_of
 
 
 class NoDamping(NamedTuple):
@@ -52,16 +52,12 @@ def alpha_of_restitution(restitution: float, speed: float) -> float:
     return 0.5 * (low + high) / (1.5 * speed)
 
 
-@law
+@law_of(NoDamping)
 def damped_load(damping, elastic_load, root_stiffness, approach, approach_rate):
     """Load [N] >= 0 of a closed contact.
 
     From the elastic load [N], the root of the tangent stiffness [sqrt(N/m)], the approach [m] > 0 and its rate [m/s].
     """
-
-
-@damped_load.body(NoDamping)
-def _(damping, elastic_load, root_stiffness, approach, approach_rate):
     return elastic_load
 
 

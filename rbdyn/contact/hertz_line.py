@@ -16,7 +16,7 @@ import numpy as np
 from rbdyn.base.arrays import Array
 from rbdyn.base.notes import Note, Notes
 from rbdyn.compiled.elementary import eighteenth_root, fast_exp, fast_log, fma, reordered_sum, rough_power
-from rbdyn.compiled.kernel import VECTOR, kernel, law, settled_kernel
+from rbdyn.compiled.kernel import VECTOR, kernel, law, law_of, settled_kernel
 
 BALLS, ROLLERS = 4200e6, 4000e6  # [Pa]
 SHEAR_YIELD = 6900e6 / 3.0 / math.sqrt(3.0)  # k [Pa]
@@ -147,13 +147,9 @@ def slice_contact(
     return TiltedLineContact(line, drop, share, rise, math.cos(direction), math.sin(direction))
 
 
-@law
+@law_of(LineContact)
 def whole_load(contact, approach):
     """Load [N] and tangent stiffness [N/m] of a plain line contact at a positive approach [m]."""
-
-
-@whole_load.body(LineContact)
-def _(contact, approach):
     root = eighteenth_root(approach)
     per_approach = contact.stiffness * (root * root)
     return per_approach * approach, 10.0 / 9.0 * per_approach
@@ -203,13 +199,9 @@ def _(contact, approach):
     return contact.stiffness * (y4 * y4 * y2), in_series
 
 
-@law
+@law_of(PowerLineContact, LogarithmicLineContact, LineContactOnBar, SlicedLineContact, TiltedLineContact)
 def root_stiffness(contact, stiffness, approach):
     """Square root of the tangent stiffness [sqrt(N/m)] that a contact has at an approach [m]."""
-
-
-@root_stiffness.body(PowerLineContact, LogarithmicLineContact, LineContactOnBar, SlicedLineContact, TiltedLineContact)
-def _(contact, stiffness, approach):
     return math.sqrt(stiffness)
 
 
@@ -243,13 +235,9 @@ def _(contact, overlap, nx, ny):
     return load, stiffness, approach, 0.0
 
 
-@law
+@law_of(SlicedLineContact)
 def slice_drop(contact, k, nx, ny):
     """Overlap of slice ``k`` less than that of the roller's middle [m]."""
-
-
-@slice_drop.body(SlicedLineContact)
-def _(contact, k, nx, ny):
     return contact.relief[k]
 
 
@@ -258,13 +246,9 @@ def _(contact, k, nx, ny):
     return contact.relief[k] - (nx * contact.direction_x + ny * contact.direction_y) * contact.rise[k]
 
 
-@law
+@law_of(SlicedLineContact)
 def slice_rise(contact, k):
     """Additional overlap of slice ``k`` where the tilt is largest [m]."""
-
-
-@slice_rise.body(SlicedLineContact)
-def _(contact, k):
     return 0.0
 
 
@@ -302,13 +286,9 @@ def _(contact, overlap, nx, ny):
     return load, stiffness, approach, rise * (nx * contact.direction_y - ny * contact.direction_x)
 
 
-@law
+@law_of(LineContact, PowerLineContact, LogarithmicLineContact, SlicedLineContact)
 def around(contact, slope, size):
     """``slope`` over azimuth times ``size``; nothing, and not computed, between parallel races."""
-
-
-@around.body(LineContact, PowerLineContact, LogarithmicLineContact, SlicedLineContact)
-def _(contact, slope, size):
     return 0.0
 
 
@@ -317,13 +297,9 @@ def _(contact, slope, size):
     return slope * size
 
 
-@law
+@law_of(LineContact)
 def whole_energy(contact, approach):
     """Energy [J] stored in a plain line contact at a positive approach [m]: the integral of its load."""
-
-
-@whole_energy.body(LineContact)
-def _(contact, approach):
     return 9.0 / 19.0 * whole_load(contact, approach)[0] * approach
 
 

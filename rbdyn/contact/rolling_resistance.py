@@ -20,7 +20,7 @@ import math
 from typing import NamedTuple
 
 from rbdyn.compiled.elementary import fma, tenth_root
-from rbdyn.compiled.kernel import kernel, law
+from rbdyn.compiled.kernel import kernel, law_of
 
 SMALLEST_LOAD = 1e-30  # [N], keeps the root finite
 # Biboulet and Houpert 2010: the rigid branch 1.42 sqrt(U W), and its transition to the elastic one, 1.47 U^0.75.
@@ -138,13 +138,9 @@ def starved(
     )
 
 
-@law
+@law_of(NoRollingResistance)
 def rolling_force(film, load, entrainment_speed):
     """Rolling resistance per surface [N] at a contact load [N] and an entrainment speed [m/s], both > 0."""
-
-
-@rolling_force.body(NoRollingResistance)
-def _(film, load, entrainment_speed):
     return 0.0
 
 
@@ -263,13 +259,9 @@ def touching_gap(
     return max(gap, roughness)
 
 
-@law
+@law_of(OpenFilm)
 def film_reach(film):
     """Gap [m] from which on there is no film."""
-
-
-@film_reach.body(OpenFilm)
-def _(film):
     return math.inf
 
 
@@ -278,16 +270,12 @@ def _(film):
     return 1.0 / (film.inverse_root * film.inverse_root)
 
 
-@law
+@law_of(OpenFilm)
 def film_forces(film, overlap, entrainment_speed, slip):
     """Rolling force on each surface and sliding force on the roller [N], with the signs of the speeds [m/s]; 0 in contact.
 
     ``overlap`` [m]: minus the gap.
     """
-
-
-@film_forces.body(OpenFilm)
-def _(film, overlap, entrainment_speed, slip):
     gap = max(-overlap, 0.0)
     size = math.sqrt(gap * gap + film.touching_gap * film.touching_gap)
     root = gap / (size * math.sqrt(size))

@@ -8,7 +8,7 @@ import numpy as np
 
 from rbdyn.base.arrays import Array
 from rbdyn.compiled.elementary import fast_exp, fast_log, fast_tanh, fma
-from rbdyn.compiled.kernel import kernel, law
+from rbdyn.compiled.kernel import kernel, law_of
 
 SMALLEST_LOAD = 1e-30  # [N], keeps the logarithm finite
 LARGEST_SPEED_RATIO = 1e12  # slip over the speed scale of a surface; mu has long become constant
@@ -121,13 +121,9 @@ def four_constants(mu_0: float, mu_m: float, mu_inf: float, u_m: float) -> tuple
     return a, b, b / x, mu_inf
 
 
-@law
+@law_of(NoTraction)
 def traction(model, slip, load):
     """Signed traction coefficient at a signed slip [m/s] and a load [N] >= 0; traction times slip is never negative."""
-
-
-@traction.body(NoTraction)
-def _(model, slip, load):
     return 0.0
 
 
@@ -160,14 +156,10 @@ def _(model, slip, load):
     return mixed(model, slip, load, traction(model.fluid, slip, load))
 
 
-@law
+@law_of(NoTraction)
 def growth(model, slip, load):
     """Growth of the size of the traction coefficient over the logarithm of the slip, arguments as of ``traction``; negative past a
     peak."""
-
-
-@growth.body(NoTraction)
-def _(model, slip, load):
     return 0.0
 
 
@@ -224,13 +216,9 @@ def mixed_growth(model, slip, load, film):
     return share * rubbing_growth(model.boundary, model.blend_speed, slip) + (1.0 - share) * film
 
 
-@law
+@law_of(*TABLELESS)
 def without_table(model):
     """A law as scalars: ``SurfaceAxes`` replace its table, for ``table_place`` and ``traction_by_table``."""
-
-
-@without_table.body(*TABLELESS)
-def _(model):
     return model
 
 
@@ -246,13 +234,9 @@ def _(model):
     )
 
 
-@law
+@law_of(SurfaceAxes)
 def table_place(model, slip, load):
     """Position of a slip [m/s] and a load [N] in the table of a law [cells]: along the slip and along the load."""
-
-
-@table_place.body(SurfaceAxes)
-def _(model, slip, load):
     along = fast_log(1.0 + slip_ratio(model, slip)) * model.slip_density
     along = along if along < model.last_slip else model.last_slip
     across = (math.sqrt(load if load > 0.0 else 0.0) - model.load_origin) * model.load_density
@@ -273,13 +257,9 @@ def slip_ratio(axes, slip):
     return LARGEST_SPEED_RATIO if ratio > LARGEST_SPEED_RATIO else ratio
 
 
-@law
+@law_of(TractionSurface)
 def table_cubic(model, along, across):
     """Coefficients of the cubic along the slip at a ``table_place``, from the constant on, and the place in its cell."""
-
-
-@table_cubic.body(TractionSurface)
-def _(model, along, across):
     # Both positions are within the table for any slip and load, NaN included.
     i, j = int(along), int(across)
     # A row of its own would be counted by reference, in atomic instructions.
@@ -298,13 +278,9 @@ def _(model, along, across):
     return table_cubic(model.fluid, along, across)
 
 
-@law
+@law_of(*TABLELESS)
 def traction_by_table(model, slip, load, value):
     """``traction`` of a law without its table, from the value of the table."""
-
-
-@traction_by_table.body(*TABLELESS)
-def _(model, slip, load, value):
     return traction(model, slip, load)
 
 
@@ -319,13 +295,9 @@ def _(model, slip, load, value):
     return mixed(model, slip, load, traction_by_table(model.fluid, slip, load, value))
 
 
-@law
+@law_of(*TABLELESS)
 def growth_by_table(model, slip, load, value, slope):
     """``growth`` of a law without its table, from value and slope of its ``table_cubic``."""
-
-
-@growth_by_table.body(*TABLELESS)
-def _(model, slip, load, value, slope):
     return growth(model, slip, load)
 
 

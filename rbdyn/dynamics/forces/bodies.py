@@ -12,7 +12,7 @@ surroundings are the drag of the oil-air mixture on orbiting rollers, and gravit
 import math
 from typing import NamedTuple
 
-from rbdyn.compiled.kernel import law
+from rbdyn.compiled.kernel import law_of
 from rbdyn.dynamics.forces.state import SUPPORT_VX, SUPPORT_VY, SUPPORT_X, SUPPORT_Y
 
 
@@ -32,33 +32,21 @@ class HeldRing(NamedTuple):
     """Outer ring whose centre is fixed."""
 
 
-@law
+@law_of(HeldRing)
 def outer_motion(ring, y, speed, cosine, sine):
     """Motion of the outer ring that turns at ``speed``."""
-
-
-@outer_motion.body(HeldRing)
-def _(ring, y, speed, cosine, sine):
     return RingMotion(0.0, 0.0, 0.0, 0.0, speed, cosine, sine)
 
 
-@law
+@law_of(HeldRing)
 def support_motion(ring, gravity, force_x, force_y, y, row, dy):
     """Write the outer ring's rates under the forces [N] on it; returns the power lost in the damper [W]."""
-
-
-@support_motion.body(HeldRing)
-def _(ring, gravity, force_x, force_y, y, row, dy):
     return 0.0
 
 
-@law
+@law_of(HeldRing)
 def support_energy(ring, gravity, y):
     """Kinetic, elastic and potential energy [J] of the outer ring on its support."""
-
-
-@support_energy.body(HeldRing)
-def _(ring, gravity, y):
     return 0.0, 0.0, 0.0
 
 
@@ -115,13 +103,9 @@ class UnbalancedCage(NamedTuple):
     offset: float  # e [m]
 
 
-@law
+@law_of(BalancedCage)
 def cage_acceleration(cage, fx, fy, moment, cosine, sine, speed):
     """Acceleration of the geometric centre x, y and of the rotation; ``cosine, sine``: of the cage angle."""
-
-
-@cage_acceleration.body(BalancedCage)
-def _(cage, fx, fy, moment, cosine, sine, speed):
     return fx / cage.mass, fy / cage.mass, moment / cage.inertia
 
 
@@ -132,13 +116,9 @@ def _(cage, fx, fy, moment, cosine, sine, speed):
     return (fx / cage.mass + inward * cosine + ahead * sine, fy / cage.mass + inward * sine - ahead * cosine, spin_up)
 
 
-@law
+@law_of(BalancedCage)
 def cage_kinetic_energy(cage, vx, vy, cosine, sine, speed):
     """Kinetic energy [J]."""
-
-
-@cage_kinetic_energy.body(BalancedCage)
-def _(cage, vx, vy, cosine, sine, speed):
     return 0.5 * cage.mass * (vx * vx + vy * vy) + 0.5 * cage.inertia * speed * speed
 
 
@@ -149,13 +129,9 @@ def _(cage, vx, vy, cosine, sine, speed):
     return 0.5 * cage.mass * (ux * ux + uy * uy) + 0.5 * cage.inertia * speed * speed
 
 
-@law
+@law_of(BalancedCage)
 def mass_centre(cage, x, y, cosine, sine):
     """Centre of mass x, y [m]."""
-
-
-@mass_centre.body(BalancedCage)
-def _(cage, x, y, cosine, sine):
     return x, y
 
 
@@ -192,13 +168,9 @@ class TwoSpeedDrive(NamedTuple):
     load_x: float
 
 
-@law
+@law_of(SteadyDrive)
 def action(drive, y):
     """The action at a state."""
-
-
-@action.body(SteadyDrive)
-def _(drive, y):
     return Action(drive.inner_speed, 0.0, drive.load_x, 0.0, 1.0, 0.0, 1.0, 0.0)
 
 
@@ -207,33 +179,20 @@ def _(drive, y):
     return Action(drive.inner_speed, drive.outer_speed, drive.load_x, 0.0, 1.0, 0.0, 1.0, 0.0)
 
 
-@law
+@law_of(SteadyDrive, TwoSpeedDrive)
 def tick(drive, acting, row, dy):
     """Write the derivatives of the clock, where there is one."""
 
 
-@tick.body(SteadyDrive, TwoSpeedDrive)
-def _(drive, acting, row, dy):
-    pass
-
-
-@law
+@law_of(SteadyDrive, TwoSpeedDrive)
 def load_power(drive, acting, vx, vy):
     """Power [W] that the load gives to the inner ring, where it has no potential."""
-
-
-@load_power.body(SteadyDrive, TwoSpeedDrive)
-def _(drive, acting, vx, vy):
     return 0.0
 
 
-@law
+@law_of(SteadyDrive, TwoSpeedDrive)
 def load_potential(drive, ring_x):
     """Potential energy [J] of a constant load; zero where its work is booked as power."""
-
-
-@load_potential.body(SteadyDrive, TwoSpeedDrive)
-def _(drive, ring_x):
     return -drive.load_x * ring_x
 
 
@@ -258,13 +217,9 @@ def cylinder_drag(
     return CylinderDrag(0.5 * density * coefficient * diameter * length)
 
 
-@law
+@law_of(NoDrag)
 def drag_forces(drag, rollers, y, row, dy):
     """Write the drag on each roller into row ``row`` of ``dy``; returns the power lost [W]."""
-
-
-@drag_forces.body(NoDrag)
-def _(drag, rollers, y, row, dy):
     for i in range(2 * rollers, 4 * rollers):
         dy[row, i] = 0.0
     return 0.0
@@ -295,14 +250,9 @@ class Gravity(NamedTuple):
     y: float
 
 
-@law
+@law_of(NoGravity)
 def add_weight(gravity, first, count, row, dy):
     """Add gravity to the accelerations of ``count`` bodies: x from ``first`` on in row ``row`` of ``dy``, then y."""
-
-
-@add_weight.body(NoGravity)
-def _(gravity, first, count, row, dy):
-    pass
 
 
 @add_weight.body(Gravity)
@@ -312,13 +262,9 @@ def _(gravity, first, count, row, dy):
         dy[row, i + count] += gravity.y
 
 
-@law
+@law_of(NoGravity)
 def height_energy(gravity, mass, x, y):
     """Potential energy [J] of a mass [kg] at x, y [m]."""
-
-
-@height_energy.body(NoGravity)
-def _(gravity, mass, x, y):
     return 0.0
 
 

@@ -8,7 +8,7 @@ under outer guidance, the inner ring under inner guidance.
 import math
 from typing import Any, NamedTuple
 
-from rbdyn.compiled.kernel import kernel, law
+from rbdyn.compiled.kernel import kernel, law_of
 from rbdyn.contact.cage_film import PocketFilm, ShortJournalFilm, journal_film_force, wall_film
 from rbdyn.contact.damping import damped_load
 from rbdyn.contact.hertz_line import root_stiffness, whole_energy, whole_load
@@ -90,16 +90,12 @@ def clearance_of(pocket, radius):
     return pocket.half_clearance - (radius - pocket.nominal_radius)
 
 
-@law
+@law_of(NoPocket)
 def pocket_gap(pocket, radius, offset, height):
     """Gap between a roller and where its pocket begins to act on it [m]; ``pocket_contact`` is zero where it is positive.
 
     ``offset, height``: centre of the roller less that of the cage, across and along the pocket's mid-line [m].
     """
-
-
-@pocket_gap.body(NoPocket)
-def _(pocket, radius, offset, height):
     return 1.0
 
 
@@ -119,16 +115,12 @@ def _(pocket, radius, offset, height):
     return min(walls, clearance_of(pocket, radius) - abs(height - pocket.orbit_radius))
 
 
-@law
+@law_of(Pocket, LubricatedPocket)
 def pocket_approach(pocket, radius, offset, height, across, along):
     """Speed at which a roller nears the wall or lip that it is nearest to [m/s].
 
     ``across, along``: rates of ``offset`` and ``height``, which are as in ``pocket_gap``.
     """
-
-
-@pocket_approach.body(Pocket, LubricatedPocket)
-def _(pocket, radius, offset, height, across, along):
     return across if offset > 0.0 else -across
 
 
@@ -141,17 +133,13 @@ def _(pocket, radius, offset, height, across, along):
     return along if height > pocket.orbit_radius else -along
 
 
-@law
+@law_of(NoPocket)
 def pocket_contact(pocket, radius, ex, ey, dx, dy, dvx, dvy, roller_spin, cage_speed):
     """``PocketWrench`` of a pocket on its roller: Chen et al. 2022, eq 16, for the front and the rear wall alike.
 
     ``ex, ey``: unit vector of the pocket's mid-line, outward; ``dx ... dvy``: centre of the roller less that of the
     cage, position [m] and velocity [m/s]; spins [rad/s].
     """
-
-
-@pocket_contact.body(NoPocket)
-def _(pocket, radius, ex, ey, dx, dy, dvx, dvy, roller_spin, cage_speed):
     return PocketWrench(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
@@ -268,13 +256,9 @@ def _(pocket, radius, ex, ey, dx, dy, dvx, dvy, roller_spin, cage_speed):
     )
 
 
-@law
+@law_of(NoPocket)
 def pocket_energy(pocket, radius, ex, ey, dx, dy):
     """Elastic energy [J] of a pocket contact, arguments as in ``pocket_contact``."""
-
-
-@pocket_energy.body(NoPocket)
-def _(pocket, radius, ex, ey, dx, dy):
     return 0.0
 
 
@@ -364,16 +348,12 @@ class LandForces(NamedTuple):
     damping: float
 
 
-@law
+@law_of(NoFilm)
 def film_wrench(film, ex, ey, e, evx, evy, journal_speed, bearing_speed):
     """``JournalWrench`` of the film alone.
 
     ``ex, ey, e``: direction and size [m] of the journal's offset; ``evx, evy``: its velocity [m/s].
     """
-
-
-@film_wrench.body(NoFilm)
-def _(film, ex, ey, e, evx, evy, journal_speed, bearing_speed):
     return JournalWrench(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
@@ -393,13 +373,9 @@ def _(film, ex, ey, e, evx, evy, journal_speed, bearing_speed):
     return JournalWrench(fx, fy, journal_moment, bearing_moment, 0.0, power, 0.0, 0.0)
 
 
-@law
+@law_of(NoContact)
 def dry_wrench(dry, radius, ex, ey, e, evx, evy, journal_speed, bearing_speed):
     """``JournalWrench`` of the contact, without a film."""
-
-
-@dry_wrench.body(NoContact)
-def _(dry, radius, ex, ey, e, evx, evy, journal_speed, bearing_speed):
     return JournalWrench(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
@@ -446,13 +422,9 @@ def journal_wrench(guide, dx, dy, dvx, dvy, journal_speed, bearing_speed):
     )
 
 
-@law
+@law_of(NoGuide)
 def guide_forces(guide, cage, inner, outer):
     """Land forces, from the motions (``RingMotion``) of cage, inner and outer ring."""
-
-
-@guide_forces.body(NoGuide)
-def _(guide, cage, inner, outer):
     return LandForces(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
@@ -476,13 +448,9 @@ def _(guide, cage, inner, outer):
     )  # fmt: skip
 
 
-@law
+@law_of(NoContact)
 def dry_energy(dry, e):
     """Elastic energy [J] of the land contact at an eccentricity [m]."""
-
-
-@dry_energy.body(NoContact)
-def _(dry, e):
     return 0.0
 
 
@@ -491,13 +459,9 @@ def _(dry, e):
     return whole_energy(dry.contact, e - dry.play) if e > dry.play else 0.0
 
 
-@law
+@law_of(NoGuide)
 def guide_energy(guide, cage_x, cage_y, inner_x, inner_y, outer_x, outer_y):
     """Elastic energy [J] stored in the guide land, from the centres [m]."""
-
-
-@guide_energy.body(NoGuide)
-def _(guide, cage_x, cage_y, inner_x, inner_y, outer_x, outer_y):
     return 0.0
 
 

@@ -1,6 +1,6 @@
 """Impacts of rollers in their pockets, from the first approach of a contact to its end, followed over the ends of steps."""
 
-from rbdyn.compiled.kernel import kernel, law, routine
+from rbdyn.compiled.kernel import kernel, law_of, routine
 from rbdyn.dynamics.forces.cage import Impacts, NoImpacts, pocket_approach
 from rbdyn.dynamics.forces.equations import cage_motion, pocket_direction, roller_count
 from rbdyn.dynamics.forces.races import roller_radius
@@ -9,18 +9,13 @@ from rbdyn.dynamics.forces.state import APPROACH, EXPONENTS, NUMBER, PEAK, PEAK_
 SLOWEST_APPROACH = 1e-30  # [m/s], for a contact that begins without one
 
 
-@law
+@law_of(NoImpacts)
 def book_impacts(impacts, bearing, y, gap, followed, sums):
     """Follow the contacts in all pockets over a step from ``y``, and book impacts that end.
 
     ``gap``: of ``Scratch`` at the end of the step. ``followed`` (FOLLOWED, rollers) and ``sums`` (rollers, IMPACT_SUMS) change
     in place.
     """
-
-
-@book_impacts.body(NoImpacts)
-def _(impacts, bearing, y, gap, followed, sums):
-    pass
 
 
 @book_impacts.body(Impacts)

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rbdyn.compiled.kernel import VECTOR, alike, either, kernel, law
+from rbdyn.compiled.kernel import VECTOR, alike, either, kernel, law_of
 from rbdyn.contact import hertz_line
 from rbdyn.contact.rolling_resistance import LayerFilm, OpenFilm, film_forces, film_reach
 from rbdyn.contact.tangential import (
@@ -94,13 +94,9 @@ def scratch(rollers: int) -> Scratch:
     )
 
 
-@law
+@law_of(races.EqualRollers)
 def lane_radius(sizes, packed, lane):
     """Radius of the roller in a lane of ``packed`` [m]."""
-
-
-@lane_radius.body(races.EqualRollers)
-def _(sizes, packed, lane):
     return sizes.radius
 
 
@@ -109,12 +105,7 @@ def _(sizes, packed, lane):
     return packed[RADII + lane]
 
 
-@law
-def in_vectors(parameters):
-    """Whether neighbouring contacts with this law share vector instructions."""
-
-
-@in_vectors.body(
+@law_of(
     hertz_line.LineContact,
     hertz_line.PowerLineContact,
     hertz_line.LogarithmicLineContact,
@@ -123,7 +114,8 @@ def in_vectors(parameters):
     SurfaceAxes,
     TractionSurface,
 )
-def _(parameters):
+def in_vectors(parameters):
+    """Whether neighbouring contacts with this law share vector instructions."""
     return True
 
 
@@ -221,14 +213,9 @@ def keep_approach(race, side, radius, ring, source, j, stride, coefficient, met,
     keep_place(race.traction, approach.slip, approach.load, met, i)
 
 
-@law
+@law_of(*TABLELESS)
 def keep_place(traction_model, slip, load, met, i):
     """Write the place of lane ``i`` in the table of a law."""
-
-
-@keep_place.body(*TABLELESS)
-def _(traction_model, slip, load, met, i):
-    pass
 
 
 @keep_place.body(SurfaceAxes)
@@ -260,14 +247,9 @@ def approach_of_lane(met, i):
     )
 
 
-@law
+@law_of(*TABLELESS)
 def look_up(traction_model, met, first, count):
     """Write the cubics along the slip of the lanes from ``first`` to ``count``, whose place in the cell replaces that in the table."""
-
-
-@look_up.body(*TABLELESS)
-def _(traction_model, met, first, count):
-    pass
 
 
 @look_up.body(TractionSurface)
@@ -284,13 +266,9 @@ def _(traction_model, met, first, count):
     look_up(traction_model.fluid, met, first, count)
 
 
-@law
+@law_of(*TABLELESS)
 def from_table(traction_model, met, i):
     """Value and slope over the slip at lane ``i`` from the table of a law, after ``look_up``; 0 without a table."""
-
-
-@from_table.body(*TABLELESS)
-def _(traction_model, met, i):
     return 0.0, 0.0
 
 
@@ -471,16 +449,12 @@ def open_contact(film, race, radius, ring, dx, dy, dvx, dvy, roller_spin):
     )
 
 
-@law
+@law_of(NoOpenFilm)
 def with_open_films(film, on_ring, race, sizes, ring, rollers, y, row, dy, scratch):
     """``OnRing`` of the inner ring with the films of all rollers, whose forces and moments go to row ``row`` of ``dy``.
 
     Rollers that touch the race, or are farther from it than the film reaches, are left out.
     """
-
-
-@with_open_films.body(NoOpenFilm)
-def _(film, on_ring, race, sizes, ring, rollers, y, row, dy, scratch):
     return on_ring
 
 

@@ -12,7 +12,7 @@ of the cage at most, since a load that vibrates passes a limit many times.
 import math
 from typing import NamedTuple
 
-from rbdyn.compiled.kernel import kernel, law, routine
+from rbdyn.compiled.kernel import kernel, law_of, routine
 from rbdyn.dynamics.forces import state
 from rbdyn.dynamics.forces.equations import motions
 from rbdyn.dynamics.forces.races import RaceWrench, race_observed
@@ -41,16 +41,12 @@ class RaceSamples(NamedTuple):
     pause: float  # fewest samples between two entries of a roller
 
 
-@law
+@law_of(NoRaceSamples)
 def book_races(samples, bearing, y, time, next_time, followed, sums):
     """Sample the race contacts in state ``y`` where it is ``time`` [s] for it; returns when the next sample is due [s].
 
     ``followed`` (FOLLOWED, rollers) and ``sums`` (SAMPLED, columns) change in place.
     """
-
-
-@book_races.body(NoRaceSamples)
-def _(samples, bearing, y, time, next_time, followed, sums):
     return math.inf
 
 

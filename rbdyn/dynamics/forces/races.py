@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rbdyn.compiled.kernel import VECTOR, kernel, law
+from rbdyn.compiled.kernel import VECTOR, kernel, law_of
 from rbdyn.contact.damping import damped_load
 from rbdyn.contact.hertz_line import around, line_load, root_stiffness
 from rbdyn.contact.rolling_resistance import rolling_force
@@ -52,16 +52,12 @@ def turned_multiple(order, cosine, sine):
     return real, imaginary
 
 
-@law
+@law_of(RoundRace)
 def form_at(form, nx, ny, ring_cos, ring_sin):
     """Radius above the mean [m] and its slope over angle [m/rad], at the direction ``nx, ny`` from the ring's centre.
 
     ``ring_cos, ring_sin``: direction of the mark on the ring.
     """
-
-
-@form_at.body(RoundRace)
-def _(form, nx, ny, ring_cos, ring_sin):
     return 0.0, 0.0
 
 
@@ -76,13 +72,9 @@ def _(form, nx, ny, ring_cos, ring_sin):
     return rise, slope
 
 
-@law
+@law_of(RoundRace)
 def sloped(form, slope, size):
     """``slope`` times ``size``; nothing, and not computed, on a round race."""
-
-
-@sloped.body(RoundRace)
-def _(form, slope, size):
     return 0.0
 
 
@@ -131,13 +123,9 @@ def unequal_rollers(radii: NDArray[np.float64]) -> UnequalRollers:
     return UnequalRollers(np.concatenate((radii, np.full(-len(radii) % VECTOR, radii[0]))))
 
 
-@law
+@law_of(EqualRollers)
 def roller_radius(sizes, number):
     """Radius of a roller [m]."""
-
-
-@roller_radius.body(EqualRollers)
-def _(sizes, number):
     return sizes.radius
 
 

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rbdyn.compiled.kernel import kernel, law
+from rbdyn.compiled.kernel import kernel, law_of
 from rbdyn.dynamics.forces.bodies import Action, action, load_potential, load_power, tick
 from rbdyn.dynamics.forces.state import INNER_ANGLE, OUTER_ANGLE, TIME
 
@@ -60,13 +60,9 @@ def share_of_segment(times, i, time):
     return (time - times[i]) / (times[i + 1] - times[i])
 
 
-@law
+@law_of(Constant)
 def value_at(schedule, time):
     """Value of a schedule at a time [s]."""
-
-
-@value_at.body(Constant)
-def _(schedule, time):
     return schedule.value
 
 

@@ -41,7 +41,7 @@ adds the couple f_i D T_i about the groove centre.
 import math
 from typing import Any, NamedTuple
 
-from rbdyn.compiled.kernel import kernel, law
+from rbdyn.compiled.kernel import kernel, law, law_of
 
 
 class Spinning(NamedTuple):
@@ -201,13 +201,9 @@ def friction_force(force: float, limit: float) -> tuple[float, float, float]:
     return side * part * limit, slope, side * (part - abs(force) / limit * slope)
 
 
-@law
-def spin_share(control: Any, inner_deflection: float, outer_deflection: float) -> Any:
+@law_of(FixedShare)
+def spin_share(control: Any, inner_deflection: float, outer_deflection: float) -> tuple[float, float, float]:
     """Inner share s of spin and gyroscopic moment, and its derivatives by the deflections [1/m]."""
-
-
-@spin_share.body(FixedShare)
-def _fixed(control: Any, inner_deflection: float, outer_deflection: float) -> tuple[float, float, float]:
     return control.inner, 0.0, 0.0
 
 
@@ -220,13 +216,9 @@ def _by_friction(control: Any, inner_deflection: float, outer_deflection: float)
     return share, both / inner_deflection, -both / outer_deflection
 
 
-@law
-def has_race_control(control: Any) -> Any:
+@law_of(CommonCage)
+def has_race_control(control: Any) -> bool:
     """Whether the raceway control differs from one common cage speed."""
-
-
-@has_race_control.body(CommonCage)
-def _never(control: Any) -> bool:
     return False
 
 
