@@ -36,6 +36,7 @@ from doe.workflow.calibration import Question, find_calibration, read_question
 from doe.workflow.identification import Evidence
 from doe.workflow.status import scene_identity
 from rbdyn.base.terminal import show
+from rbdyn.scene import Scene
 from rbdyn.scene.unknown import put
 
 HERE = Path(__file__).parent
@@ -135,12 +136,14 @@ def survival(found: Evidence, simulations: Simulations) -> list[str]:
         tables = copy.deepcopy(found.case.data)
         for key, value in zip(FACTORS.values(), design, strict=True):
             put(tables, key, value)
-        scenes = replace(found.case, data=tables).scenes(found.inputs, values, SEEDS)
+        sets = replace(found.case, data=tables).scenes(found.inputs, values, SEEDS)
+        scenes = [each for each in sets if isinstance(each, Scene)]
         labels = [f"posterior pair {place}" for place in range(len(scenes))]
         ran = simulations.run(scenes, labels, simulations.progress("baseline and pick"))
-        if any(isinstance(each, Failure) for each in ran):
+        results = [each for each in ran if not isinstance(each, Failure)]
+        if len(results) < len(sets):
             raise SystemExit("a pair failed")
-        outputs.append(clearance.figures(RESPONSES, ran)[0])
+        outputs.append(clearance.figures(RESPONSES, results)[0])
     better = outputs[1] < outputs[0]
     lines = []
     for response, wins in zip((*RESPONSES, "all three"), (*better.T, better.all(axis=1)), strict=True):

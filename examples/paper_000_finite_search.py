@@ -346,10 +346,10 @@ def frame(outcomes: Sequence[Outcome]) -> pd.DataFrame:
 
 def draw_figure_7(found: dict[str, Any], path: Path) -> None:
     """Contact angles against azimuth: both methods, and what the sign of the gyroscopic moment changes."""
-    from rbdyn.plots.style import BLUE, GREEN, ORANGE, VERMILION, plain, plt, save
+    from rbdyn.plots.style import BLUE, GREEN, ORANGE, VERMILION, plain, save, subplots
 
     curves = found["curves"]
-    figure, axes = plt.subplots(1, 2, figsize=(11.0, 4.8), sharey=True)
+    figure, axes = subplots(1, 2, figsize=(11.0, 4.8), sharey=True)
     z = next(iter(curves["search"].values())).shape[1]
     azimuth = 360.0 * np.arange(z) / z
     for (speed, both), colour in zip(curves["search"].items(), (BLUE, GREEN, ORANGE, VERMILION), strict=True):
@@ -370,9 +370,9 @@ def draw_figure_7(found: dict[str, Any], path: Path) -> None:
 
 def draw_figure_10(outcomes: Sequence[DoubleOutcome], path: Path) -> None:
     """Contact angles against azimuth in both layers: the search (lines) and the convex solver (dots)."""
-    from rbdyn.plots.style import BLUE, GREEN, ORANGE, VERMILION, plain, plt, save
+    from rbdyn.plots.style import BLUE, GREEN, ORANGE, VERMILION, plain, save, subplots
 
-    figure, axes = plt.subplots(1, 2, figsize=(11.0, 4.8))
+    figure, axes = subplots(1, 2, figsize=(11.0, 4.8))
     for o, colour in zip(outcomes, (BLUE, GREEN, ORANGE, VERMILION), strict=True):
         ours, exact = layer_angles(o.searched), layer_angles(o.convex)
         for axis, name in zip(axes, ours, strict=True):
@@ -400,9 +400,9 @@ class Tried(NamedTuple):
 
 def draw_offsets(tried: Sequence[Tried], path: Path) -> None:
     """Offset distance against the search: filled where it was tried, open where it would have gone on."""
-    from rbdyn.plots.style import plain, plt, save
+    from rbdyn.plots.style import plain, save, subplots
 
-    figure, axis = plt.subplots(figsize=(7.6, 4.8))
+    figure, axis = subplots(figsize=(7.6, 4.8))
     plain(axis)
     for one in tried:
         count = np.arange(1, one.offsets.size + 1)
@@ -420,7 +420,7 @@ def _show(table: pd.DataFrame) -> None:
     header = ("test", "bearing", "Fr/Fa/rpm", "searches", "theirs", "nearest", "steps", "offset [um]", "left [N]", "[us]",
               "their s", "convex [us]", "steps", "left [N]")  # fmt: skip
     rows = [
-        (f"{r.test}", r.bearing, f"{r.radial}/{r.axial}/{r.speed}", f"{r.searches}", f"{r.their_searches}",
+        (f"{r.test}", f"{r.bearing}", f"{r.radial}/{r.axial}/{r.speed}", f"{r.searches}", f"{r.their_searches}",
          f"{r.nearest_search}", f"{r.iterations}", f"{r.offset_um:.1f}", f"{r.residual_N:.0e}", f"{r.search_us:.0f}",
          f"{r.their_seconds:g}", f"{r.convex_us:.0f}", f"{r.convex_steps}", f"{r.convex_residual_N:.0e}")
         for r in table.itertuples()
@@ -449,9 +449,9 @@ def main(out: Annotated[Path | None, typer.Option(help="Write both tables and fi
          "convex [us]", "gap [%]", "inner layer [deg]", "outer"),
         [
             (f"{r.axial}, {r.speed}", f"{r.searches}", f"{r.their_searches}", f"{r.nearest_search}", f"{r.iterations}",
-             f"{r.offset_um:.1f}", f"{r.residual_N:.0e}", f"{1e3 * r.search_s:.0f}", f"{r.their_seconds:g}",
+             f"{r.offset_um:.1f}", f"{r.residual_N:.0e}", f"{r.search_ms:.0f}", f"{r.their_seconds:g}",
              f"{r.convex_us:.0f}", f"{r.gap_percent:.0e}", f"{r.inner_layer_inner_deg:.2f}", f"{r.outer_layer_inner_deg:.2f}")
-            for r in double.itertuples()
+            for r in double.assign(search_ms=1e3 * double["search_s"]).itertuples()
         ],
     )  # fmt: skip
     show([block])

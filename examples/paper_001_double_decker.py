@@ -195,7 +195,8 @@ def draw(frame: pd.DataFrame, path: Path) -> None:
     """Figs. 3 to 6 in one picture at ``path`` and Fig. 7 beside it, named ``..._materials``."""
     figure, axes = canvas(2, 2, 5.2, 3.8)
     for number, (axis, (layer, race)) in enumerate(zip(axes.flat, ANGLES, strict=True), start=3):
-        for (rings, form), part in frame.groupby(["rings", "growth"], sort=False):
+        for kind, part in frame.groupby(["rings", "growth"], sort=False):
+            rings, form = map(str, kind)
             style = {"none": "o-", "thick_ring": "s--", "paper": "^:"}[form]
             label = f"{rings}, {'no growth' if form == 'none' else form.replace('_', ' ')}"
             colour = "C0" if rings == "steel" else "C1"

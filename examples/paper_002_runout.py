@@ -14,7 +14,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 import pandas as pd
@@ -71,7 +71,7 @@ def half(height_um: float, order: int) -> tuple[int, float, float]:
 
 def races(kind: str, inner_um: float, outer_um: float, inner_order: int, outer_order: int) -> RaceErrors:
     """Errors of one kind on both races."""
-    forms = {
+    forms: dict[str, Any] = {
         f"inner_{kind}": waviness(half(inner_um, inner_order)),
         f"outer_{kind}": waviness(half(outer_um, outer_order)),
     }
@@ -87,14 +87,14 @@ def sphericity(order: int, aligned: bool) -> RaceErrors:
 
 def diameters(large: np.ndarray) -> RaceErrors:
     """Nine balls larger by 0.40 um."""
-    return replace(perfect(BALLS), ball_diameter=0.4e-6 * large)
+    return replace(perfect(BALLS), ball_diameter=np.where(large, 0.4e-6, 0.0))
 
 
 def everything(order: int, outer_order: int) -> RaceErrors:
     """Case 6: balls of cases 1 and 2, side-sways of case 3, roundness errors of case 4."""
     return replace(
         sphericity(2, True),
-        ball_diameter=0.4e-6 * ONE_SIDE,
+        ball_diameter=diameters(ONE_SIDE).ball_diameter,
         inner_sway=waviness(half(1.6, 1)),
         outer_sway=waviness(half(1.7, 1)),
         inner_roundness=waviness(half(1.5, order)),

@@ -64,7 +64,7 @@ class Evaluator:
         self.done = 0
         self.failures: list[Failure] = []
 
-    def run(self, runs: list[Run], label: str) -> tuple[Array, Array, Whole]:
+    def run(self, runs: Sequence[Run], label: str) -> tuple[Array, Array, Whole]:
         """Responses (n, m) of runs, their 95 % half-widths (n, m) and sample sizes (n, m); NaN for a failed run."""
         labels = [f"{label} {self.done + row}" for row in range(1, len(runs) + 1)]
         results = self._simulations.run(runs, labels, self._watch)

@@ -309,9 +309,9 @@ def _flat(of: Run) -> dict[str, Any]:
 
 def _draw(runs: dict[str, list[Run]], path: Path) -> None:
     """Share of the scenes that each solver has solved within a time [us]."""
-    from rbdyn.plots.style import METHOD_COLOURS, Named, label_ends, plain, plt, save
+    from rbdyn.plots.style import METHOD_COLOURS, Named, label_ends, plain, save, subplots
 
-    figure, axis = plt.subplots(figsize=(7.6, 5.0))
+    figure, axis = subplots(figsize=(7.6, 5.0))
     axis.set(xscale="log", xlabel="time of a call [us]", ylim=(0.0, 103.0))
     axis.set_ylabel("share of scenes solved within it [%]")
     plain(axis)

@@ -102,7 +102,8 @@ def bars() -> str:
         inside = roller_interior(sizes, named.series == "10")
         cage, contact = cage_in(named.series, sizes.width, inside), 1e-3 * inside.effective_length
         lengths = cage.bar_width, cage.bar_thickness, cage.bar_length, cage.side_ring_width
-        section = CageSection(*(1e-3 * each for each in lengths), 1e-3 * inside.pitch_diameter, inside.rollers)
+        width, thickness, length, ring = (1e-3 * each for each in lengths)
+        section = CageSection(width, thickness, length, ring, 1e-3 * inside.pitch_diameter, inside.rollers)
         clamped = 1.0 / bar_compliance(bar_beam(section, brass), contact, np.zeros((2, 2)))
         cells = bar_stiffness(section, brass, contact), clamped, bar_stiffness(section, soft, contact)
         shape = "{:.2f} x {:.2f} x {:.1f}, {:.2f}".format(*lengths)

@@ -40,7 +40,7 @@ def drawn(count: int, seed: int) -> dict[str, tuple[str, ...]]:
     sizes = [
         row["size"] for row in table("cylindrical_rollers") if float(row["bore"]) <= 100.0 and row["reference_speed"]
     ]
-    scenes = {}
+    scenes: dict[str, tuple[str, ...]] = {}
     for size in draw.choice(sizes, count, replace=False):
         box = envelope(read_designation(f"NU{size}"))
         assert box.reference_speed is not None and box.dynamic_capacity is not None

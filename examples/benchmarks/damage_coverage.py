@@ -14,12 +14,13 @@ from pathlib import Path
 
 import rbdyn
 from rbdyn.dynamics.figures import DAMAGE
+from rbdyn.result import Quantity
 from rbdyn.scene import Scene
 
 TRUTH_SEED, TRUTH_TIMES = 987_654, 10
 
 
-def errors_of(quantity: rbdyn.Quantity) -> float:
+def errors_of(quantity: Quantity) -> float:
     """Half-width of statistical and numerical error together."""
     return math.hypot(quantity.statistical_error or 0.0, quantity.numerical_error or 0.0)
 

@@ -130,7 +130,7 @@ class Generations(Evaluator):
         super().__init__(study, simulations, settings.evaluations, "direct front")
         self._settings = settings
 
-    def __call__(self, points: Array) -> tuple[Array, Array]:
+    def __call__(self, points: Array) -> tuple[Array, Array]:  # type: ignore[override]
         """Responses (n, m) and their standard errors (n, m) at points (n, k) in factor units; NaN where a run failed."""
         values, errors, samples = self.run(scenes(self._study, self._settings, points, self.done), "direct run")
         return values, standard_errors(errors, samples)

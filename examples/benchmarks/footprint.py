@@ -32,7 +32,7 @@ def footprint(scene: "Scene", bearing: "RollerBearing") -> Footprint:
     from rbdyn.dynamics.parameters.state import layout_of
     from rbdyn.dynamics.run import explicit_method, method_of
 
-    pair = method_of(explicit_method(scene.numerics.method, scene.numerics.rtol), scene, bearing)
+    pair = method_of(explicit_method(scene), scene, bearing)
     return Footprint(layout_of(scene).size, parameter_bytes(bearing), instructions(bearing, pair))
 
 

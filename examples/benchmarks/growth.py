@@ -214,10 +214,15 @@ def measured(size: int, command: list[str]) -> Measured:
     """Run a command with a bound on its time and its memory."""
     room = int(4096 + ROOM * LIMIT_MIB) << 20  # threads and machine code take addresses, not memory
     bounds = {resource.RLIMIT_AS: room, resource.RLIMIT_CPU: int(STOP * LIMIT_S)}
+
+    def bounded() -> None:
+        for kind, most in bounds.items():
+            resource.setrlimit(kind, (most, most))
+
     with tempfile.TemporaryFile("w+") as errors:
         process = subprocess.Popen(
             command, stdout=subprocess.DEVNULL, stderr=errors, env={**os.environ, "PYTHONPATH": str(EXAMPLES.parent)},
-            preexec_fn=lambda: [resource.setrlimit(kind, (most, most)) for kind, most in bounds.items()],
+            preexec_fn=bounded,
         )  # fmt: skip
         _, status, usage = os.wait4(process.pid, 0)
         errors.seek(0)

@@ -29,7 +29,7 @@ from doe.running.store import Store
 from doe.workflow.problem import Problem
 from doe.workflow.robust import Robust, judge
 from doe.workflow.uncertainty import OUTPUTS, Uncertainty, find_uncertainty
-from rbdyn.scene.uncertain import Law, Uncertain
+from rbdyn.scene.uncertain import Uncertain
 from rbdyn.scene.unknown import Input, inputs_of, value_of
 
 # Every set is run as long as this, whatever the tool takes.
@@ -38,7 +38,7 @@ Z = float(stats.norm.ppf(0.975))
 SEEDS = 900_000_000
 
 
-def distribution(law: Law) -> Any:
+def distribution(law: Any) -> Any:
     """The law of a number, as scipy has it."""
     low, high = law.low, law.high
     if law.law == "log_uniform":
@@ -49,7 +49,7 @@ def distribution(law: Law) -> Any:
     return stats.uniform(low, high - low)
 
 
-def draws(law: Law, count: int, random: np.random.Generator) -> list[Any]:
+def draws(law: Any, count: int, random: np.random.Generator) -> list[Any]:
     """Values of a law."""
     if law.law == "choices":
         weights = np.array(law.weights or [1.0] * len(law.values))
@@ -63,7 +63,9 @@ def scene_at(path: Path, inputs: Sequence[Input], row: Mapping[str, Any], more: 
     values = {key: row[key] for key, law in laws.items() if law.times is None}
     values |= {key: row[key] * values[law.times] for key, law in laws.items() if law.times in values}
     base = rbdyn.Scene.load(path, [*(f"{key}={value!r}" for key, value in values.items()), *more])
-    values |= {key: row[key] * value_of(base, law.times) for key, law in laws.items() if key not in values}
+    values |= {
+        key: row[key] * value_of(base, law.times) for key, law in laws.items() if law.times and key not in values
+    }
     return rbdyn.Scene.load(path, [*(f"{key}={value!r}" for key, value in values.items()), *more])
 
 

@@ -25,7 +25,7 @@ from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 from statistics import median
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from rbdyn.dynamics.ensemble import Outcome, Stop, run_all
 from rbdyn.dynamics.figures import BEARING
@@ -157,11 +157,8 @@ def true_plan(scene: Scene) -> Companions:
 
 def figures_of(runs: Sequence[Replicate], companions: Sequence[Replicate], share: float) -> dict[str, Quantity]:
     """Figures without what slow change may add, for runs and truths are of one length."""
-    return {
-        figure.key: quantity(figure.statistic, runs, companions, share, 0.0, figure.scale)
-        for figure in BEARING
-        if figure.key in JUDGED
-    }
+    judged: list[Any] = [figure for figure in BEARING if figure.key in JUDGED]
+    return {figure.key: quantity(figure.statistic, runs, companions, share, 0.0, figure.scale) for figure in judged}
 
 
 def truth_of(scene: Scene, workers: int) -> dict[str, tuple[float, float]]:

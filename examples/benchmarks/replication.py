@@ -198,13 +198,13 @@ def _draw(rows: Sequence[Row], path: Any) -> None:
         Named,
         label_ends,
         logarithmic,
-        plt,
         save,
+        subplots,
     )
 
     names = list(rows[0].half_width)
     lengths = list(dict.fromkeys(row.turns for row in rows))
-    figure, axes = plt.subplots(1, len(names), figsize=(12.0, 4.6), sharey=True)
+    figure, axes = subplots(1, len(names), figsize=(12.0, 4.6), sharey=True)
     ends: list[list[Named]] = []
     for axis, name in zip(axes, names, strict=True):
         logarithmic(axis, "relative 95 % half-width", "processor time [s]" if axis is axes[0] else "")

@@ -160,7 +160,7 @@ def simulated(folder: Path, kind: str, number: int) -> Answer:
     (folder / f"record_{kind}_{number}.json").write_text(
         json.dumps({**found.as_dict(), "truth": truth}, indent=1), "utf-8"
     )
-    ranges = found.inputs
+    ranges: Any = found.inputs
     covered = [ranges[key].low <= value <= ranges[key].high for key, value in truth.items() if ranges]
     resolutions = [output.resolution for output in found.outputs.values()]
     return Answer(kind, number, found.verdict, found.reasons, covered, resolutions)

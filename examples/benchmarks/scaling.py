@@ -232,9 +232,9 @@ def report(measured: Scaling) -> Report:
 
 def _draw(measured: Scaling, path: Path) -> None:
     """A panel a size, with the fitted line, and a panel of memory."""
-    from rbdyn.plots.style import BLUE, GREY, plain, plt, save
+    from rbdyn.plots.style import BLUE, GREY, plain, save, subplots
 
-    figure, axes = plt.subplots(1, 3, figsize=(12.0, 3.8), width_ratios=(1.0, 1.0, 0.6))
+    figure, axes = subplots(1, 3, figsize=(12.0, 3.8), width_ratios=(1.0, 1.0, 0.6))
     for axis, (kind, line) in zip(axes, measured.lines.items(), strict=False):
         points = measured.points[kind]
         size = np.array([point.size for point in points])

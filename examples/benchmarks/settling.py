@@ -20,6 +20,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -82,10 +83,10 @@ class Pooled:
         batches, run = batches_of(self.scene), self.run
         part = slice(self.skip, self.skip + batches.count(turns))
         ends, count = slice(part.start, part.stop + 1), len(run.durations)
-        over_batches = {
+        over_batches: dict[str, Any] = {
             name: array for name, array in vars(run).items() if isinstance(array, np.ndarray) and len(array) == count
         }
-        arrays = {name: array[part] for name, array in over_batches.items()}
+        arrays: dict[str, Any] = {name: array[part] for name, array in over_batches.items()}
         return replace(run, first=batches.first, energy=run.energy[ends], **arrays)
 
 
