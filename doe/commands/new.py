@@ -13,19 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
-from rbdyn.base.command import (
-    ForceFile,
-    Json,
-    OutFile,
-    check_out,
-    fill_template,
-    flag,
-    guarded,
-    hand_out,
-    notice,
-    plain_number,
-    valued,
-)
+from rbdyn.base import command
 from rbdyn.base.faults import InputError, MethodError
 from rbdyn.base.tables.sheet import listed
 from rbdyn.base.words import counted
@@ -104,7 +92,7 @@ def new(
     path: Annotated[Path, typer.Argument(metavar="SCENE.toml", help="Scene file whose clearances to study.")],
     limit: Annotated[
         list[str] | None,
-        valued(
+        command.valued(
             "NAME<=V",
             'Limit a response, in quotes: "power_loss_W<=250", >= or = for <=; repeatable.',
             "none",
@@ -112,24 +100,25 @@ def new(
         ),
     ] = None,
     tolerances: Annotated[
-        bool, flag("--tolerances", help="Add tolerances of the clearances by ISO 286 grade, and the widest ones.")
+        bool,
+        command.flag("--tolerances", help="Add tolerances of the clearances by ISO 286 grade, and the widest ones."),
     ] = False,
-    chains: Annotated[bool, flag("--chains", help="Add the dimension chains of the parts.")] = False,
+    chains: Annotated[bool, command.flag("--chains", help="Add the dimension chains of the parts.")] = False,
     duty: Annotated[
         Path | None,
-        valued(
+        command.valued(
             "FILE",
             "Operating points of a duty cycle: CSV with name, share or hours, and keys; or TOML.",
             "the scene file's own",
             "--duty",
         ),
     ] = None,
-    out: OutFile = None,
-    force: ForceFile = False,
-    as_json: Json = False,
+    out: command.OutFile = None,
+    force: command.ForceFile = False,
+    as_json: command.Json = False,
 ) -> None:
     """Create a commented study file for the clearances of a scene file."""
-    with guarded(as_json):
+    with command.guarded(as_json):
         from doe.study_file.study import StudyFile
         from doe.workflow.effort import Effort
         from doe.workflow.front import check_goals
@@ -139,7 +128,7 @@ def new(
         from rbdyn.base.faults import read_toml, validated
         from rbdyn.scene import DrawnScene, rollers_only
 
-        check_out(out, force, reads := [path, *([duty] if duty else [])])
+        command.check_out(out, force, reads := [path, *([duty] if duty else [])])
         limits, class_limit = limits_of(limit or []), _class_limit(limit or [])
         scene = rollers_only(DrawnScene.load(path))
         points, hours = _duty(duty, scene)
@@ -156,7 +145,7 @@ def new(
         text, study = written(factors)
         check_goals(study)
         with tempfile.TemporaryDirectory() as temporary:
-            folder, effort = Path(temporary), Effort(notice=notice(False))
+            folder, effort = Path(temporary), Effort(notice=command.notice(False))
             moved = region_that_runs(study, folder, effort, kept=1.0).study
             if moved is not study:
                 sections["baseline"], factors = _baseline(moved), _moved(factors, study, moved)
@@ -169,7 +158,7 @@ def new(
                 sections["duty"] = duty_text(points, hours, slow)
                 text, study = written(factors, FEWER)
         check_study(study)
-        hand_out(text, as_json, out, force, "doe study", reads)
+        command.hand_out(text, as_json, out, force, "doe study", reads)
 
 
 def _quoted_path(path: Path, out: Path | None) -> str:
@@ -303,7 +292,7 @@ def limits_of(texts: Sequence[str]) -> Limits:
             faults.append(f"{where}: no response has that name; choose one of {listed(names)}")
             continue
         try:
-            value = plain_number(number, quantity(name)[1])
+            value = command.plain_number(number, quantity(name)[1])
         except MethodError as error:
             faults.append(f"{where}: {one_line(number, LONGEST_NAME)} {error}")
             continue
@@ -373,7 +362,7 @@ def _filled(sections: Mapping[str, str], values: Mapping[str, str | None]) -> st
     text = _template()
     for name, section in sections.items():
         text = text.replace(f"{{{name}}}", section)
-    return fill_template(text, values)
+    return command.fill_template(text, values)
 
 
 def _chain_text(group: "ClearanceParts", manufacture: "Manufacture", derived: bool) -> str:

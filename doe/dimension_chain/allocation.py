@@ -21,26 +21,8 @@ from math import exp, inf, sqrt
 
 import numpy as np
 
+from doe.dimension_chain import links
 from doe.dimension_chain.closing import ClosingFunction, NoValueError, closing_function, interval, middle, total
-from doe.dimension_chain.links import (
-    DIGITS,
-    SLACK,
-    Chain,
-    Cost,
-    Interval,
-    Link,
-    Mode,
-    Part,
-    allocated_part,
-    at_nominal,
-    class_within,
-    least_tolerance,
-    narrower,
-    places,
-    rounded_part,
-    seat_part,
-    stated_part,
-)
 from doe.dimension_chain.yields import Assemblies, closing_moments, draw, exact_shares, standard_error
 from rbdyn.base.faults import MethodError
 from rbdyn.base.records import Record
@@ -60,7 +42,7 @@ SPAN = 700.0  # of the logarithm of the multiplier, the range of a float
 class Allocation(Record):
     """The search for tolerances of a valid chain."""
 
-    chain: Chain
+    chain: links.Chain
 
     @cached_property
     def function(self) -> ClosingFunction:
@@ -68,7 +50,7 @@ class Allocation(Record):
         return closing_function(self.chain.link)
 
     @property
-    def mode(self) -> Mode:
+    def mode(self) -> links.Mode:
         """Criterion by which the tolerances fill the limits."""
         return self.chain.allocate.mode
 
@@ -78,7 +60,7 @@ class Allocation(Record):
         return self.chain.allocate.resolution_mm
 
     @property
-    def adjusted(self) -> Link:
+    def adjusted(self) -> links.Link:
         """The link whose nominal is moved."""
         free = {link.name: link for link in self.chain.free if link.coefficient or link.name in self.function.arguments}
         name = self.chain.allocate.adjust
@@ -92,29 +74,31 @@ class Allocation(Record):
         if all(by_coefficient.values()):
             return by_coefficient
         by_name = {link.name: link for link in self.chain.link}
-        parts = [stated_part(link, by_name) for link in self.chain.link if link.is_dimension or link.thermal_growth]
+        parts = [
+            links.stated_part(link, by_name) for link in self.chain.link if link.is_dimension or link.thermal_growth
+        ]
         slopes = self.function.sensitivities(middle(parts))
         return {name: coefficient or slopes[name] for name, coefficient in by_coefficient.items()}
 
-    def parts(self, tolerances: Tolerances, grades: Grades | None = None) -> list[Part]:
+    def parts(self, tolerances: Tolerances, grades: Grades | None = None) -> list[links.Part]:
         """All parts, with ``tolerances`` in mm of those that are not fixed, and with one nominal moved.
 
         Raises MethodError where no nominal of that part brings the closing link to its limits.
         """
         return self._adjusted_parts(self._parts(tolerances, grades or {}))
 
-    def _parts(self, tolerances: Tolerances, grades: Grades) -> list[Part]:
+    def _parts(self, tolerances: Tolerances, grades: Grades) -> list[links.Part]:
         """All parts at their stated nominals."""
         by_name = {link.name: link for link in self.chain.link}
         return [
-            allocated_part(link, tolerances[link.name], grades.get(link.name), self.slopes[link.name])
+            links.allocated_part(link, tolerances[link.name], grades.get(link.name), self.slopes[link.name])
             if link.name in tolerances
-            else stated_part(link, by_name)
+            else links.stated_part(link, by_name)
             for link in self.chain.link
             if link.is_dimension or link.thermal_growth
         ]
 
-    def _adjusted_parts(self, parts: list[Part]) -> list[Part]:
+    def _adjusted_parts(self, parts: list[links.Part]) -> list[links.Part]:
         """The parts with one nominal moved. Raises MethodError as ``parts``."""
         stated, moved, distance = parts, self.adjusted.name, 0.0
         # One step is exact unless a function uses the moved part; then these are steps of Newton's method.
@@ -129,9 +113,9 @@ class Allocation(Record):
                 raise
             if not abs(step) < inf:
                 break
-            nominals = {part.name: round(part.nominal_mm + step, DIGITS) for part in parts if part.name == moved}
-            parts = [at_nominal(part, nominals.get(part.name, part.nominal_mm)) for part in parts]
-            if moved not in self.function.arguments or abs(step) < SLACK:
+            nominals = {part.name: round(part.nominal_mm + step, links.DIGITS) for part in parts if part.name == moved}
+            parts = [links.at_nominal(part, nominals.get(part.name, part.nominal_mm)) for part in parts]
+            if moved not in self.function.arguments or abs(step) < links.SLACK:
                 return parts
             distance += abs(step)
             if not distance <= WANDER * abs(self.adjusted.nominal):
@@ -141,18 +125,18 @@ class Allocation(Record):
             return stated
         raise MethodError("no nominal of this part brings the closing link to its limits; name another part")
 
-    def rounded_parts(self, tolerances: Tolerances, grades: Grades | None = None) -> list[list[Part]]:
+    def rounded_parts(self, tolerances: Tolerances, grades: Grades | None = None) -> list[list[links.Part]]:
         """The parts as the drawing states them, with the moved nominal on the steps next to its place, the nearer first."""
-        parts = [rounded_part(part, self.resolution) for part in self._parts(tolerances, grades or {})]
+        parts = [links.rounded_part(part, self.resolution) for part in self._parts(tolerances, grades or {})]
         parts = self._adjusted_parts(parts)
         moved = next(part for part in parts if part.name == self.adjusted.name)
-        candidates = places(moved, self.resolution)
+        candidates = links.places(moved, self.resolution)
         return [[self._seat(place if part.name == moved.name else part) for part in parts] for place in candidates]
 
-    def _seat(self, part: Part) -> Part:
+    def _seat(self, part: links.Part) -> links.Part:
         """An allocated seat, which counts by its fit only, with its stated nominal; other parts as they are."""
         seat = part.origin == "allocated" and part.coefficient == 0 and part.name in self.seats
-        return seat_part(part) if seat else part
+        return links.seat_part(part) if seat else part
 
     @cached_property
     def seats(self) -> dict[str, bool]:
@@ -160,7 +144,7 @@ class Allocation(Record):
         fits = [link.press_fit for link in self.chain.link if link.press_fit]
         return {fit.bore: False for fit in fits} | {fit.shaft: True for fit in fits}
 
-    def narrowest(self) -> list[Part]:
+    def narrowest(self) -> list[links.Part]:
         """The parts with the narrowest tolerances that drawing and processes carry; those that fit, if any do."""
         candidates = self.rounded_parts(self.least)
         return next((parts for parts in candidates if self.fits(parts)), candidates[0])
@@ -168,16 +152,16 @@ class Allocation(Record):
     @cached_property
     def least(self) -> dict[str, float]:
         """Narrowest tolerance, mm, of each free link."""
-        return {link.name: least_tolerance(link, self.resolution) for link in self.chain.free}
+        return {link.name: links.least_tolerance(link, self.resolution) for link in self.chain.free}
 
-    def fits(self, parts: list[Part]) -> bool:
+    def fits(self, parts: list[links.Part]) -> bool:
         """Whether parts keep the limits in the mode of the chain."""
         if self.mode == "yield":
             return self.sure_yield(parts) >= self.chain.allocate.target_yield
         limits, (low, high) = self.chain.closing_link, interval(self.function, parts, self.mode)
-        return limits.lower_mm - SLACK <= low and high <= limits.upper_mm + SLACK
+        return limits.lower_mm - links.SLACK <= low and high <= limits.upper_mm + links.SLACK
 
-    def sure_yield(self, parts: list[Part]) -> float:
+    def sure_yield(self, parts: list[links.Part]) -> float:
         """Yield with each part's own distribution, by convolution or, with functions, two errors below a Monte Carlo."""
         limits = self.chain.closing_link
         if self.function.linear:
@@ -185,13 +169,13 @@ class Allocation(Record):
         share = self._assemblies(parts).yields["as_given"]
         return share - 2 * standard_error(share, SAMPLES)
 
-    def tails(self, parts: list[Part]) -> Interval:
+    def tails(self, parts: list[links.Part]) -> links.Interval:
         """Closing links, mm, with the target yield between them and equal tails, by Monte Carlo."""
         tail = (1 - self.chain.allocate.target_yield) / 2
         low, high = np.quantile(self._assemblies(parts).values, (tail, 1 - tail))
         return float(low), float(high)
 
-    def allocated(self) -> list[Part] | None:
+    def allocated(self) -> list[links.Part] | None:
         """Parts whose tolerances fill the limits, as the drawing states them; None where even the narrowest do not fit."""
         narrowest = self.narrowest()
         if not self.fits(narrowest):
@@ -204,16 +188,16 @@ class Allocation(Record):
             tolerances, grades = self._graded(tolerances)
         return self._classed(self._narrowed(tolerances, grades) or narrowest)
 
-    def _classed(self, parts: list[Part]) -> list[Part]:
+    def _classed(self, parts: list[links.Part]) -> list[links.Part]:
         """The parts, allocated seats with the class of ISO 286 within their limits."""
         return [
-            replace(part, iso_class=class_within(part, self.seats[part.name]) or None)
+            replace(part, iso_class=links.class_within(part, self.seats[part.name]) or None)
             if part.origin == "allocated" and part.name in self.seats
             else part
             for part in parts
         ]
 
-    def _narrowed(self, tolerances: dict[str, float], grades: dict[str, str]) -> list[Part] | None:
+    def _narrowed(self, tolerances: dict[str, float], grades: dict[str, str]) -> list[links.Part] | None:
         """Rounded parts that keep the limits, the widest tolerances narrowed until they do; None where all are narrowest."""
         while True:
             try:
@@ -228,7 +212,7 @@ class Allocation(Record):
             if not wide:
                 return None
             widest = max(wide, key=lambda name: abs(self.slopes[name]) * tolerances[name])
-            tolerances[widest] = narrower(tolerances[widest], self.least[widest], self.resolution)
+            tolerances[widest] = links.narrower(tolerances[widest], self.least[widest], self.resolution)
             grades.pop(widest, None)
 
     def linear_rule(self) -> dict[str, float]:
@@ -237,7 +221,7 @@ class Allocation(Record):
         Raises MethodError where a part has no effect.
         """
         rule, free = self.chain.allocate, self.chain.free
-        mode: Mode = "worst_case" if rule.mode == "worst_case" else "rss"
+        mode: links.Mode = "worst_case" if rule.mode == "worst_case" else "rss"
         bare = self.parts({link.name: 0.0 for link in free})
         slopes = self.function.sensitivities(middle(bare))
         fixed = total([abs(slopes[part.name]) * part.tolerance_mm for part in bare], mode)
@@ -283,7 +267,7 @@ class Allocation(Record):
         """Each tolerance, mm, at the widest grade within it, and these grades; one finer than IT01 keeps its width."""
         free = {link.name: link for link in self.chain.free}
         ladders = {name: list(grade_tolerances(link.nominal).items()) for name, link in free.items()}
-        room = {name: tolerances[name] + SLACK for name in ladders}
+        room = {name: tolerances[name] + links.SLACK for name in ladders}
         steps = {name: sum(width <= room[name] for _, width in ladder) - 1 for name, ladder in ladders.items()}
 
         def choice(steps: Mapping[str, int]) -> tuple[dict[str, float], dict[str, str]]:
@@ -307,14 +291,14 @@ class Allocation(Record):
         except MethodError:
             return False
 
-    def _worth(self, link: Link, ladder: list[tuple[str, float]], step: int) -> tuple[float, float]:
+    def _worth(self, link: links.Link, ladder: list[tuple[str, float]], step: int) -> tuple[float, float]:
         """Value of the next wider grade: the saved cost, or without a curve the fineness of the present grade."""
         narrow, wide = ladder[step][1], ladder[step + 1][1]
         if link.cost is None:
             return 0.0, -step
         return link.cost.b * (narrow**-link.cost.k - wide**-link.cost.k), -step
 
-    def _missing(self, parts: list[Part]) -> float:
+    def _missing(self, parts: list[links.Part]) -> float:
         """Shift of the closing link to its target, mm."""
         limits = self.chain.closing_link
         if self.mode != "yield":
@@ -324,12 +308,12 @@ class Allocation(Record):
             return target - closing_moments(self.function, parts, None)[0]
         return target - sum(self.tails(parts)) / 2
 
-    def _assemblies(self, parts: list[Part]) -> Assemblies:
+    def _assemblies(self, parts: list[links.Part]) -> Assemblies:
         seed, limits = self.chain.monte_carlo.seed, self.chain.closing_link
         return draw(self.function, parts, limits, samples=SAMPLES, seed=seed, laws=())
 
 
-def cheapest(curves: Sequence[Cost], slopes: Sequence[float], width: float, mode: Mode) -> list[float]:
+def cheapest(curves: Sequence[links.Cost], slopes: Sequence[float], width: float, mode: links.Mode) -> list[float]:
     """Tolerances, mm, of least cost whose worst case or root sum square is ``width``; slopes must not be zero.
 
     Raises MethodError, with the required width, where the narrowest fill more.
@@ -337,7 +321,7 @@ def cheapest(curves: Sequence[Cost], slopes: Sequence[float], width: float, mode
 
     from scipy.optimize import brentq
 
-    def tolerance(curve: Cost, slope: float, log_multiplier: float) -> float:
+    def tolerance(curve: links.Cost, slope: float, log_multiplier: float) -> float:
         power, weight = (curve.k + 2, 2 * slope**2) if mode == "rss" else (curve.k + 1, abs(slope))
         optimum = (curve.k * curve.b / weight) ** (1 / power) * exp(-log_multiplier / power)
         return max(optimum, curve.narrowest_mm)
@@ -355,6 +339,6 @@ def cheapest(curves: Sequence[Cost], slopes: Sequence[float], width: float, mode
     return tolerances(brentq(excess, -SPAN / 4, SPAN, xtol=1e-13, rtol=1e-14))
 
 
-def total_cost(curves: Sequence[Cost], tolerances: Sequence[float]) -> float:
+def total_cost(curves: Sequence[links.Cost], tolerances: Sequence[float]) -> float:
     """Cost of all tolerances, mm."""
     return sum(curve.a + curve.b / t**curve.k for curve, t in zip(curves, tolerances, strict=True))

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from doe.dimension_chain import refusal
 from doe.dimension_chain.allocation import Allocation, total_cost
 from doe.dimension_chain.closing import ClosingFunction, NoValueError, interval, linear_interval, middle
 from doe.dimension_chain.links import (
@@ -21,16 +22,6 @@ from doe.dimension_chain.links import (
     stated_parts,
 )
 from doe.dimension_chain.reading import faults
-from doe.dimension_chain.refusal import (
-    Judge,
-    Miss,
-    Remedy,
-    allocated_reason,
-    keeps_limits,
-    miss_of,
-    remedy_of,
-    stated_reason,
-)
 from doe.dimension_chain.yields import (
     COMMON_LAWS,
     Assemblies,
@@ -189,8 +180,8 @@ class ChainResult(Record):
     resolution_mm: float
     sizes: dict[str, PartSize] = keyed("parts")
     contributions_mm: dict[str, dict[str, float]]
-    missed: Miss | None
-    remedy: Remedy | None
+    missed: refusal.Miss | None
+    remedy: refusal.Remedy | None
     allocation: tuple[Part, ...] = outside_json(default=())
     parts: tuple[Part, ...] = outside_json(default=())
 
@@ -273,8 +264,8 @@ class _Verdict(Record):
     """Status of judged parts; for refused ones also the miss, the remedy and the nearest parts that meet the limits."""
 
     status: str
-    missed: Miss | None = None
-    remedy: Remedy | None = None
+    missed: refusal.Miss | None = None
+    remedy: refusal.Remedy | None = None
     nearest: list[Part] | None = None
 
 
@@ -303,7 +294,7 @@ def _judged(search: Allocation, samples: int, seed: int) -> _Judged:
         status = _allocated_status(chain)
     elif chain.is_stated and _fits(search, parts, assemblies.yields["as_given"]):
         status = "ok"
-    elif matched is not None and keeps_limits(chain, matched):
+    elif matched is not None and refusal.keeps_limits(chain, matched):
         status = f"{MATCHED} {matched.classes} classes; random assemblies violate the limits"
     return _Judged(parts, assemblies, matched, status)
 
@@ -327,7 +318,7 @@ def _with_sizes(chain: Chain, parts: Sequence[Part]) -> Chain:
     return chain.model_copy(update={"link": links})
 
 
-def _verdict(search: Allocation, judged: _Judged, accepted: Judge) -> _Verdict:
+def _verdict(search: Allocation, judged: _Judged, accepted: refusal.Judge) -> _Verdict:
     if judged.status is not None:
         return _Verdict(judged.status)
     chain, parts, share = search.chain, judged.parts, judged.share
@@ -335,9 +326,11 @@ def _verdict(search: Allocation, judged: _Judged, accepted: Judge) -> _Verdict:
     nearest = search.allocated() if chain.is_stated and any(link.fit is None for link in chain.free) else None
     if nearest is not None and not accepted(_with_sizes(chain, nearest))[0]:
         nearest = None
-    reason = stated_reason(search, parts, share, nearest) if chain.is_stated else allocated_reason(search)
-    remedy = remedy_of(search, parts, share, accepted)
-    return _Verdict(f"refused: {reason}", miss_of(search, parts, share), remedy, nearest)
+    reason = (
+        refusal.stated_reason(search, parts, share, nearest) if chain.is_stated else refusal.allocated_reason(search)
+    )
+    remedy = refusal.remedy_of(search, parts, share, accepted)
+    return _Verdict(f"refused: {reason}", refusal.miss_of(search, parts, share), remedy, nearest)
 
 
 def _allocated_status(chain: Chain) -> str:

@@ -11,19 +11,12 @@ import numpy as np
 
 from doe import clearance
 from doe.report.page import html_report, notes, reference
+from doe.report.sections import front
 from doe.report.sections.answer import changes, first_screen, good_news
 from doe.report.sections.chain import chains, part_sheet
 from doe.report.sections.design import run_sheet
 from doe.report.sections.duty import costs, duty_figures, gain_stills
 from doe.report.sections.fit import diagnostics, fit_files
-from doe.report.sections.front import (
-    front_sheet,
-    front_stills,
-    in_few_runs,
-    limiting_sentence,
-    robust_stills,
-    search_sentences,
-)
 from doe.report.sections.front_pictures import search_stills
 from doe.report.sections.unknown import decider_sheet, robust_input_sheet
 from doe.report.still import save
@@ -69,7 +62,7 @@ def write(outcome: StudyResult, folder: Path) -> dict[str, Any]:
     tables = {
         runs.file: runs.records,
         **fit_files(outcome.study.surfaces),
-        "front.csv": front_sheet(study.factors, study.responses, result.front.front).records
+        "front.csv": front.front_sheet(study.factors, study.responses, result.front.front).records
         if outcome.adaptive is None
         else predicted_rows(study, outcome.adaptive),
         "confirmation.csv": confirmation_sheet(study.factors, result.confirmation).records,
@@ -91,10 +84,10 @@ def write(outcome: StudyResult, folder: Path) -> dict[str, Any]:
         pictures.append(f"surface_{NO_WORD.sub('_', surface.name)}.png")
         response_surface(study, surface, folder / pictures[-1])
     stills = {
-        "robust_front.png": robust_stills(outcome.robust.front if outcome.robust else None),
+        "robust_front.png": front.robust_stills(outcome.robust.front if outcome.robust else None),
         "adaptive_search.png": [] if result.adaptive is None else search_stills(result, result.adaptive),
         "duty_gains.png": gain_stills(result),
-        "pareto_front.png": front_stills(result),
+        "pareto_front.png": front.front_stills(result),
     }
     for name, drawn_stills in stills.items():
         if drawn_stills:
@@ -123,7 +116,7 @@ def answer_text(result: Summary) -> str:
 def blocks(result: Summary) -> list[Block]:
     """Blocks for the terminal of the record of ``doe study --json``: what an engineer acts on, then notes, then the details."""
     details = [
-        *in_few_runs(result),
+        *front.in_few_runs(result),
         changes(result),
         *costs(result),
         duty_figures(result).block,
@@ -206,8 +199,8 @@ def _search(outcome: StudyResult) -> SearchResult | None:
         outcome.study,
         outcome.adaptive,
         outcome.front_comparison,
-        limiting_sentence(outcome),
-        search_sentences(outcome),
+        front.limiting_sentence(outcome),
+        front.search_sentences(outcome),
         outcome.searched_pick,
     )
 

@@ -20,18 +20,7 @@ from scipy import special
 
 from doe.designs import to_actual
 from doe.designs.model import Model, Terms, model_matrix, second_order
-from doe.response_surface.adequacy import (
-    AnovaRow,
-    Diagnostics,
-    KnownVariance,
-    ModelError,
-    Removal,
-    Source,
-    describe_diagnostics,
-    describe_known_variance,
-    find,
-    p_text,
-)
+from doe.response_surface import adequacy
 from doe.response_surface.least_squares import BoxCox, Data
 from rbdyn.base.arrays import Array
 from rbdyn.base.estimate import LEVEL
@@ -241,7 +230,7 @@ class Fit(Record, kw_only=True):
     name: str = outside_json(default="")
     model: Model
     by_term: dict[str, float] = keyed("coefficients")
-    anova: list[AnovaRow]
+    anova: list[adequacy.AnovaRow]
     lack_of_fit: LackOfFit = derived(lambda self: self._tested_by("lack_of_fit", LackOfFit))
     pure_error: PureError = derived(lambda self: self._tested_by("pure_error", PureError))
     r2: float | None
@@ -262,11 +251,11 @@ class Fit(Record, kw_only=True):
     transform: float | None
     box_cox: BoxCox | None
     blocks: dict[str, float]
-    elimination: list[Removal]
+    elimination: list[adequacy.Removal]
     canonical: Canonical | None
-    known_variance: KnownVariance | None
-    model_error: ModelError | None
-    diagnostics: Diagnostics
+    known_variance: adequacy.KnownVariance | None
+    model_error: adequacy.ModelError | None
+    diagnostics: adequacy.Diagnostics
     rival: Comparison | None
     sentences: list[str] = derived(lambda self: describe(self))
 
@@ -299,7 +288,7 @@ class Fit(Record, kw_only=True):
         return dict(zip(self.terms, values.tolist(), strict=True))
 
     def _tested_by(self, source: str, kind: type[Record]) -> Any:
-        row = find(self.anova, source).as_dict()
+        row = adequacy.find(self.anova, source).as_dict()
         return kind(**{key: row[key] for key in kind.__annotations__})
 
     def _test(self, term: str) -> Tested:
@@ -338,9 +327,9 @@ def describe(fit: Fit) -> list[str]:
     known_variance, canonical = fit.known_variance, fit.canonical
     sentences = [
         *(_terms(fit), _collinearity(fit), _lack_of_fit(fit), _removed(fit), _blocks(fit)),
-        *([] if known_variance is None else describe_known_variance(known_variance, ALPHA)),
+        *([] if known_variance is None else adequacy.describe_known_variance(known_variance, ALPHA)),
         *(_model_error(fit), _summary(fit)),
-        *describe_diagnostics(fit.diagnostics, ALPHA),
+        *adequacy.describe_diagnostics(fit.diagnostics, ALPHA),
         _transform(fit),
         "" if canonical is None else describe_canonical(canonical, fit.stationary_point),
         "" if fit.rival is None else fit.rival.sentence,
@@ -357,11 +346,11 @@ def _terms(fit: Fit) -> str:
         return "the surface has no residual, so its terms cannot be tested."
     strong = sorted((p, source) for source, p in p_values.items() if p <= ALPHA)
     weak = [source for source, p in p_values.items() if p > ALPHA]
-    listed = ", ".join(f"{source} ({p_text(p)})" for p, source in strong)
+    listed = ", ".join(f"{source} ({adequacy.p_text(p)})" for p, source in strong)
     if not strong:
-        model = find(fit.anova, "model")
+        model = adequacy.find(fit.anova, "model")
         regression = (
-            f", but the model as a whole is (F = {model.f:.3g}, {p_text(model.p)})"
+            f", but the model as a whole is (F = {model.f:.3g}, {adequacy.p_text(model.p)})"
             if model.p is not None and model.p <= ALPHA
             else ""
         )
@@ -392,7 +381,7 @@ def _lack_of_fit(fit: Fit) -> str:
     if fit.pure_error.ms == 0.0:
         verdict = "certain" if fit.lack_of_fit.ss else "none"
         return f"lack of fit is {verdict}, because the replicates agree exactly and the residual is {'not ' if verdict == 'certain' else ''}zero."
-    listed = ", ".join(f"{p_text(p)} against {what}" for what, p in values.items())
+    listed = ", ".join(f"{adequacy.p_text(p)} against {what}" for what, p in values.items())
     if min(values.values()) > ALPHA:
         return (
             f"lack of fit is not significant ({listed}): the error of the surface is within the scatter of replicates."
@@ -405,7 +394,7 @@ def _lack_of_fit(fit: Fit) -> str:
     )
 
 
-SHOWN_BY: Mapping[Source, str] = {
+SHOWN_BY: Mapping[adequacy.Source, str] = {
     "repeats": "shown by repeats",
     "known variance": "shown by the known variance",
     "residual": "which is the whole residual, because no scatter of a run is known",
@@ -424,15 +413,15 @@ def _model_error(fit: Fit) -> str:
 def _removed(fit: Fit) -> str:
     if not fit.elimination:
         return ""
-    listed = ", ".join(f"{removal.term} ({p_text(removal.p)})" for removal in fit.elimination)
+    listed = ", ".join(f"{removal.term} ({adequacy.p_text(removal.p)})" for removal in fit.elimination)
     return f"removed in this order: {listed}; p values of the other terms are optimistic, for the same runs selected the terms."
 
 
 def _blocks(fit: Fit) -> str:
-    if not fit.blocks or (p := find(fit.anova, "block").p) is None:
+    if not fit.blocks or (p := adequacy.find(fit.anova, "block").p) is None:
         return ""
     verdict = "differ" if p <= ALPHA else "do not differ significantly"
-    return f"the blocks {verdict} ({p_text(p)}); predictions are for the mean over all runs."
+    return f"the blocks {verdict} ({adequacy.p_text(p)}); predictions are for the mean over all runs."
 
 
 def _summary(fit: Fit) -> str:

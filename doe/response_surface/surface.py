@@ -18,19 +18,8 @@ from scipy import stats
 from doe.designs.design import replicate_groups
 from doe.designs.model import MODELS, Model, Terms, in_actual_units, model_matrix, model_terms, second_order
 from doe.emulator import Emulator, fit_emulator
+from doe.response_surface import least_squares
 from doe.response_surface.adequacy import Removal, anova, compare, diagnose, eliminate, goodness, model_error
-from doe.response_surface.least_squares import (
-    Data,
-    backward,
-    box_cox,
-    check_matrix,
-    check_positive,
-    check_size,
-    forward,
-    run_data,
-    slope,
-    solve,
-)
 from doe.response_surface.statistics import Comparison, Difference, Fit, ProcessScore, Score, canonical
 from rbdyn.base.arrays import Array, Rows, Whole, one_thread
 from rbdyn.base.faults import MethodError
@@ -51,7 +40,7 @@ Rival = Callable[[Rows, Array], Array]
 class Surface(Fit, kw_only=True):
     """A fitted surface of one response with its runs ``data``; predictions are in units of the response."""
 
-    data: Data = outside_json()
+    data: least_squares.Data = outside_json()
 
     def predict(self, coded: ArrayLike) -> Array:
         """Mean response at coded points (..., k), shape (...); with a transform its median."""
@@ -77,7 +66,7 @@ class Surface(Fit, kw_only=True):
         error = np.sqrt(variance + (0.0 if self.model_error is None else self.model_error.variance))
         if self.transform is None:
             return error
-        return error / slope(self.predict(coded), self.transform)
+        return error / least_squares.slope(self.predict(coded), self.transform)
 
     def coefficient_error(self, coded: ArrayLike) -> Array:
         """Standard error of the fit at coded points (..., k), shape (...), by the covariance of its coefficients alone."""
@@ -96,7 +85,7 @@ class Surface(Fit, kw_only=True):
     def _back(self, values: Array) -> Array:
         if self.transform is None:
             return values
-        return backward(values, self.transform)
+        return least_squares.backward(values, self.transform)
 
 
 @one_thread
@@ -133,14 +122,14 @@ def fit(
     """
     if model not in MODELS:
         raise MethodError(f"{name}: model = {model!r}: choose {', '.join(MODELS[:-1])} or {MODELS[-1]}")
-    data = run_data(name, coded, values, centre, step, standard_errors, replicates, block)
+    data = least_squares.run_data(name, coded, values, centre, step, standard_errors, replicates, block)
     return _fit(name, data, model, "none" if transform is None else transform, advised=True)
 
 
-def _fit(name: str, data: Data, model: Model, transform: Transform, advised: bool) -> Surface:
+def _fit(name: str, data: least_squares.Data, model: Model, transform: Transform, advised: bool) -> Surface:
     terms = model_terms(data.points.shape[1], model)
-    check_size(name, model, terms, data.block)
-    check_matrix(name, model, terms, _columns(data, terms))
+    least_squares.check_size(name, model, terms, data.block)
+    least_squares.check_matrix(name, model, terms, _columns(data, terms))
     if not np.ptp(data.values):
         raise MethodError(
             f"{name}: all {len(data.values)} values are {data.values[0]:g}, so there is nothing to fit; check the response or "
@@ -155,9 +144,9 @@ def _fit(name: str, data: Data, model: Model, transform: Transform, advised: boo
     response, variances = _on_scale_of_fit(data, exponent)
     removed: list[Removal] = []
     if model == "reduced":
-        terms, removed = eliminate(terms, lambda subset: solve(_columns(data, subset), response))
+        terms, removed = eliminate(terms, lambda subset: least_squares.solve(_columns(data, subset), response))
     matrix = _columns(data, terms)
-    solution = solve(matrix, response)
+    solution = least_squares.solve(matrix, response)
     count = len(terms)
     covariance = (solution.mean_square * solution.inverse)[:count, :count]
     groups = replicate_groups(data.points, data.block)
@@ -192,35 +181,35 @@ def _fit(name: str, data: Data, model: Model, transform: Transform, advised: boo
         known_variance=known_variance,
         model_error=model_error(solution, matrix, groups, table, known_variance),
         transform=exponent,
-        box_cox=box_cox(matrix, data.values, name=name) if advised and open_to_transform else None,
+        box_cox=least_squares.box_cox(matrix, data.values, name=name) if advised and open_to_transform else None,
         rival=None,
     )
 
 
-def _columns(data: Data, terms: Terms) -> Array:
+def _columns(data: least_squares.Data, terms: Terms) -> Array:
     return np.hstack([model_matrix(data.points, terms), data.block_columns])
 
 
-def _exponent(name: str, data: Data, terms: Terms, transform: Transform) -> float | None:
+def _exponent(name: str, data: least_squares.Data, terms: Terms, transform: Transform) -> float | None:
     if transform == "none":
         return None
-    check_positive(data.values, name)
+    least_squares.check_positive(data.values, name)
     if transform == "box_cox":
-        transform = box_cox(_columns(data, terms), data.values, name=name).recommended
+        transform = least_squares.box_cox(_columns(data, terms), data.values, name=name).recommended
     # The exponent 1 would only shift the response by 1.
     return None if transform == 1 else float(transform)
 
 
-def _on_scale_of_fit(data: Data, exponent: float | None) -> tuple[Array, Array | None]:
+def _on_scale_of_fit(data: least_squares.Data, exponent: float | None) -> tuple[Array, Array | None]:
     """Response and variance of each run, transformed."""
     errors = data.standard_errors
     if exponent is None:
         return data.values, None if errors is None else errors**2
-    variances = None if errors is None else (errors * slope(data.values, exponent)) ** 2
-    return forward(data.values, exponent), variances
+    variances = None if errors is None else (errors * least_squares.slope(data.values, exponent)) ** 2
+    return least_squares.forward(data.values, exponent), variances
 
 
-def _block_effects(data: Data, effects: Array) -> dict[str, float]:
+def _block_effects(data: least_squares.Data, effects: Array) -> dict[str, float]:
     if not effects.size:
         return {}
     labels, first = np.unique(data.block, return_index=True)

@@ -16,21 +16,7 @@ from pydantic import BeforeValidator, Field
 from doe.designs.design import to_actual, to_coded
 from doe.designs.model import Model
 from doe.designs.optimal import Remaining
-from doe.study_file.sections import (
-    Adaptive,
-    Design,
-    Factor,
-    Front,
-    OtherLimits,
-    OverDuty,
-    Robust,
-    StudyChain,
-    Tolerances,
-    alike,
-    at_point,
-    duty_faults,
-    shares_of,
-)
+from doe.study_file import sections
 from doe.study_file.table import COUNT, LABELS, done_rows, table_of
 from rbdyn.base.arrays import Array
 from rbdyn.base.faults import (
@@ -81,7 +67,7 @@ class Fitted(Strict):
 PLACES = {f"start.{figure.place}": key for key, figure in START_FIGURES.items()}
 
 
-class Response(Fitted, OverDuty):
+class Response(Fitted, sections.OverDuty):
     """A response of the simulation, the fit of its surface, its goal and its limits."""
 
     name: Annotated[Name, BeforeValidator(lambda name: PLACES.get(name, name) if isinstance(name, str) else name)]
@@ -100,7 +86,7 @@ class PointResponse(Response):
     def of(cls, response: Response, point: str) -> Self:
         """The limits of a response at a point."""
         keys = response.model_dump(include={*Fitted.model_fields, "lower", "upper"})
-        return cls(name=at_point(point, response.name), goal="none", figure=response.name, point=point, **keys)
+        return cls(name=sections.at_point(point, response.name), goal="none", figure=response.name, point=point, **keys)
 
 
 class Confirmation(Strict):
@@ -137,29 +123,29 @@ class StudyFile(Consistent):
     """Operating points at which every run is simulated, up to 12. Default: the operating point of the scene file."""
     normalise_shares: bool = False
     """Whether the shares can have any sum, such as hours. If true, each share is divided by the sum."""
-    factor: Annotated[list[Factor], Field(min_length=1, max_length=MOST_FACTORS)]
+    factor: Annotated[list[sections.Factor], Field(min_length=1, max_length=MOST_FACTORS)]
     """Factors that the study varies."""
     response: Annotated[list[Response], Field(min_length=1)]
     """Responses that the study fits and optimises."""
-    limits: OtherLimits = OtherLimits()
+    limits: sections.OtherLimits = sections.OtherLimits()
     """Limits on the class of the cage: limits.cage.verdict = "held|circling"."""
-    design: Design = Design()
+    design: sections.Design = sections.Design()
     """Experimental design of the runs."""
-    front: Front = Front()
+    front: sections.Front = sections.Front()
     """Search of the Pareto front on the response surfaces."""
-    adaptive: Adaptive = Adaptive()
+    adaptive: sections.Adaptive = sections.Adaptive()
     """Search with emulators, used with --adaptive."""
-    robust: Robust = Robust()
+    robust: sections.Robust = sections.Robust()
     """Comparison of the designs over unknown inputs, with --robust or if this table is present."""
     uncertain: Uncertain | None = None
     """Unknown inputs of the scene. They replace the unknown inputs of the scene file."""
-    tolerances: Tolerances | None = None
+    tolerances: sections.Tolerances | None = None
     """Search for the widest tolerances of the factors about the selected design. Default: no search."""
     confirmation: Confirmation = Confirmation()
     """Simulation of the baseline and the selected design."""
     baseline: dict[str, Number] = {}
     """Values of the baseline design by factor. Default: the centre."""
-    chain: list[StudyChain] = []
+    chain: list[sections.StudyChain] = []
     """Dimension chains whose closing links are clearances of the selected design."""
     reference: Reference | None = None
     """Published table of this design, to compare with."""
@@ -199,7 +185,7 @@ class StudyFile(Consistent):
         ]
         named = {response.name: response for response in self.response}
         claims = _claims(keys) | {REPLICATES: "each kind of run has its own number of them; leave it out"}
-        faults += duty_faults(self.duty, named, self.normalise_shares, claims, self.scene is not None)
+        faults += sections.duty_faults(self.duty, named, self.normalise_shares, claims, self.scene is not None)
         return [*faults, *self._gain_faults(), *self._key_faults(keys), *self._set_faults(keys)]
 
     def _gain_faults(self) -> Iterator[str]:
@@ -264,7 +250,7 @@ class Study(Record):
 
     def _responses_over_duty(self) -> Iterator[Response]:
         points, limits = self.file.duty, list[Response]()
-        same = alike(points)
+        same = sections.alike(points)
         for response in self.file.response:
             limited = response.lower is not None or response.upper is not None
             # Where all points are one, its limits are those of the response, unless that is a ratio.
@@ -280,7 +266,7 @@ class Study(Record):
     @property
     def shares(self) -> dict[str, float]:
         """Shares of the time by point of the duty, in the order of their names; empty without a duty."""
-        return shares_of(self.file.duty)
+        return sections.shares_of(self.file.duty)
 
     def with_responses(self, names: Collection[str]) -> Self:
         """The study with the responses of these names alone."""
@@ -371,7 +357,9 @@ class Study(Record):
             self.tables[path] = read_toml(path)
         return self.tables[path]
 
-    def chain_table(self, chain: StudyChain, value: float, half_width: float | None = None) -> Mapping[str, Any]:
+    def chain_table(
+        self, chain: sections.StudyChain, value: float, half_width: float | None = None
+    ) -> Mapping[str, Any]:
         """Contents of CHAIN.toml for a chain at a picked value [mm].
 
         ``half_width`` [mm] is used if the chain states none. Raises InputError without either, or if the chain is not in its

@@ -14,17 +14,8 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 from scipy import special
 
-from doe.pareto import InfeasibleError, ParetoFront, front
+from doe.pareto import InfeasibleError, ParetoFront, front, manufacture
 from doe.pareto.front import FrontUncertainty, front_uncertainty
-from doe.pareto.manufacture import (
-    SURVIVAL_PARTS,
-    Interval,
-    ToleranceAware,
-    ToleranceBox,
-    even_offsets,
-    interval_of_share,
-    tolerance_aware_front,
-)
 from doe.pareto.search import Archive, Doubt, dominates
 from doe.pareto.tolerance import PartCount
 from doe.response_surface import Surface
@@ -41,7 +32,7 @@ SHARES = (1.0, 0.5, 0.25, 0.0)
 CLOSEST = "the point of the region that is expected to violate the limits least"
 # Keys of [front] that are arguments of the searches.
 SEARCH = {"population", "generations", "seed", "pick"}
-AnyFront = TypeVar("AnyFront", "ParetoFront", "ToleranceAware")
+AnyFront = TypeVar("AnyFront", ParetoFront, manufacture.ToleranceAware)
 
 
 @one_thread
@@ -152,10 +143,12 @@ def part_ends(study: Problem) -> Array:
     return ends
 
 
-def _tolerance_aware(study: Problem, pareto: ParetoFront, box: ToleranceBox, doubt: Doubt) -> ToleranceAware:
+def _tolerance_aware(
+    study: Problem, pareto: ParetoFront, box: manufacture.ToleranceBox, doubt: Doubt
+) -> manufacture.ToleranceAware:
     # Nominal points keep their tolerance away from a bound beyond which no bearing is possible.
     low, high = study.coded(part_ends(study).T)
-    return tolerance_aware_front(
+    return manufacture.tolerance_aware_front(
         quadratics(study.surfaces, len(study.factors)),
         box,
         np.maximum(-study.reach, low + box.half),
@@ -225,12 +218,12 @@ def check_goals(study: Problem) -> None:
     tolerance_box(study)
 
 
-def tolerance_box(study: Problem) -> ToleranceBox | None:
+def tolerance_box(study: Problem) -> manufacture.ToleranceBox | None:
     """Parts of the tolerance-aware front; None where the study asks for none. Raises as ``study.coded_tolerances``."""
     front = study.file.front
     if front.tolerance_aware == "none":
         return None
-    return ToleranceBox(study.coded_tolerances, front.tolerance_aware, front.quantile, front.distribution)
+    return manufacture.ToleranceBox(study.coded_tolerances, front.tolerance_aware, front.quantile, front.distribution)
 
 
 SCALES = np.geomspace(1.0, 100.0, 81)  # factors on the standard errors, compared by the likelihood of the misses
@@ -409,15 +402,15 @@ def keeping(study: Problem, draws: Draws, point: Array, free: Rows, least_gains:
     return counts_of
 
 
-def survival(study: Problem, draws: Draws, coded: Array, box: ToleranceBox) -> Interval:
+def survival(study: Problem, draws: Draws, coded: Array, box: manufacture.ToleranceBox) -> manufacture.Interval:
     """Interval of the share of the parts made at a ``coded`` point (k,) that dominate the nominal baseline."""
     goals = study.goals
-    parts = coded + box.half * even_offsets(SURVIVAL_PARTS, box.half.size, box.distribution)
+    parts = coded + box.half * manufacture.even_offsets(manufacture.SURVIVAL_PARTS, box.half.size, box.distribution)
     counts = []
     for values in draws(np.vstack([parts, study.coded(study.baseline)])):
         costs = goals.costs(values)
         counts.append(dominates(costs[:, :-1], costs[:, -1:]).sum(axis=1))
-    return interval_of_share(np.concatenate(counts), len(parts))
+    return manufacture.interval_of_share(np.concatenate(counts), len(parts))
 
 
 def open_errors(surfaces: Sequence[Surface], searched: bool = False) -> str:

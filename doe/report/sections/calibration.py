@@ -11,16 +11,7 @@ import numpy as np
 
 from doe.unknown.calibration import Trial, allowance_words
 from doe.unknown.posterior import Combination
-from doe.workflow.identification import (
-    CALIBRATED,
-    SAMPLE_FILE,
-    Calibration,
-    Cell,
-    Cost,
-    Evidence,
-    InputAnswer,
-    OutputAnswer,
-)
+from doe.workflow import identification
 from rbdyn.base.blocks import Block, Bullets, Column, Paragraph, Sheet, with_notes
 from rbdyn.base.files import digest_of, intact, read_json, sign, write_json
 from rbdyn.base.html import REPORT, with_report
@@ -31,7 +22,7 @@ from rbdyn.base.workbook import NAME as WORKBOOK
 from rbdyn.scene.unknown import Input
 
 POSTERIOR = "doe.posterior/1"
-RECORD, SAMPLE, OF_SAMPLE = "calibration.json", SAMPLE_FILE, "posterior.json"
+RECORD, SAMPLE, OF_SAMPLE = "calibration.json", identification.SAMPLE_FILE, "posterior.json"
 CORNER, COMPARED, MEASURED = "corner.png", "measured.png", "measured.csv"
 FILES = (RECORD, SAMPLE, OF_SAMPLE, CORNER, COMPARED, MEASURED, REPORT, WORKBOOK)
 # Least move of an input by an unseen offset that is named next to the largest, in standard deviations; most of them.
@@ -41,8 +32,8 @@ SHOWN, END = 8, 1e-3
 
 
 # Key, contraction and posterior of an input; name and answer of an output.
-InputRow = tuple[str, float, InputAnswer]
-OutputRow = tuple[str, OutputAnswer]
+InputRow = tuple[str, float, identification.InputAnswer]
+OutputRow = tuple[str, identification.OutputAnswer]
 
 
 INPUTS: tuple[Column[InputRow], ...] = (
@@ -65,7 +56,7 @@ OUTPUTS: tuple[Column[OutputRow], ...] = (
     Column("evidence", at=(1, "evidence"), meaning="Bayes factor of a larger error"),
     Column("resolution", at=(1, "resolution"), meaning="largest offset that would not be seen"),
 )
-CELLS: tuple[Column[Cell], ...] = (
+CELLS: tuple[Column[identification.Cell], ...] = (
     Column("row", meaning="row of the table"),
     Column("output", meaning="figure"),
     Column("measured", meaning="measured value with its standard deviation"),
@@ -76,7 +67,7 @@ CELLS: tuple[Column[Cell], ...] = (
 )
 
 
-def input_sheet(calibration: Calibration) -> Sheet[InputRow]:
+def input_sheet(calibration: identification.Calibration) -> Sheet[InputRow]:
     """A row an input, those that contract most first."""
     learned, answers = calibration.learnt.learned, calibration.inputs
     rows = sorted(((key, learned[key], answer) for key, answer in answers.items()), key=lambda row: -row[1])
@@ -86,12 +77,14 @@ def input_sheet(calibration: Calibration) -> Sheet[InputRow]:
     return Sheet(caption, (*INPUTS, *shares), rows)
 
 
-def output_sheet(calibration: Calibration) -> Sheet[OutputRow]:
+def output_sheet(calibration: identification.Calibration) -> Sheet[OutputRow]:
     """A row an output."""
     return Sheet("", OUTPUTS, list(calibration.outputs.items()))
 
 
-def cell_sheet(cells: Sequence[Cell], moments: Sequence[str] = ("before", "after")) -> Sheet[Cell]:
+def cell_sheet(
+    cells: Sequence[identification.Cell], moments: Sequence[str] = ("before", "after")
+) -> Sheet[identification.Cell]:
     """A row a measured value, with its predictions before and after the calibration."""
     columns = [*CELLS]
     for when in moments:
@@ -101,14 +94,14 @@ def cell_sheet(cells: Sequence[Cell], moments: Sequence[str] = ("before", "after
     return Sheet("", columns, cells, file=MEASURED, content=content)
 
 
-def measured_sheet(calibration: Calibration) -> Sheet[Cell]:
+def measured_sheet(calibration: identification.Calibration) -> Sheet[identification.Cell]:
     """The measured values of a calibration; without a posterior nothing is predicted after it."""
     return cell_sheet(calibration.cells, ("before", "after") if calibration.posterior else ("before",))
 
 
-def blocks(calibration: Calibration) -> list[Block]:
+def blocks(calibration: identification.Calibration) -> list[Block]:
     """The verdict with its reasons, inputs, identified combinations, outputs, the quality of predictions, and notes."""
-    calibrated = calibration.verdict == CALIBRATED
+    calibrated = calibration.verdict == identification.CALIBRATED
     answer: list[Block] = [
         Paragraph(verdict_words(calibration), "statement" if calibrated else "warning"),
         Bullets([] if calibrated else _hidden(calibration)),
@@ -126,9 +119,9 @@ def blocks(calibration: Calibration) -> list[Block]:
     return with_notes(calibration.notes, answer, judged=False)
 
 
-def verdict_words(calibration: Calibration) -> str:
+def verdict_words(calibration: identification.Calibration) -> str:
     """The verdict with its reasons, or with what could hide from a calibration that nothing contradicts."""
-    calibrated = calibration.verdict == CALIBRATED
+    calibrated = calibration.verdict == identification.CALIBRATED
     sentences = "; ".join(_hidden(calibration) if calibrated else calibration.reasons)
     return f"{calibration.verdict}{': ' if sentences else ''}{sentences}"
 
@@ -153,7 +146,7 @@ def _prediction_quality(trial: Trial | None) -> list[str]:
     ]
 
 
-def _outliers(calibration: Calibration) -> list[str]:
+def _outliers(calibration: identification.Calibration) -> list[str]:
     """Outliers among the measured values, and the contraction without them."""
     sentences = [
         f"{quantity(cell.output)[0]} of row {cell.row} is {cell.residual:.1f} standard deviations off its prediction by the others"
@@ -175,14 +168,14 @@ def _screened(screened: Mapping[str, float]) -> str:
     )
 
 
-def _cost_words(cost: Cost | None) -> str:
+def _cost_words(cost: identification.Cost | None) -> str:
     """What the calibration took."""
     if cost is None:
         return ""
     return f"{counted(cost.runs, 'run')} of {shown(cost.turns, 3)} shaft turns in all took {duration(cost.seconds)}."
 
 
-def _output_words(name: str, output: OutputAnswer) -> str:
+def _output_words(name: str, output: identification.OutputAnswer) -> str:
     """The discrepancy of an output that has one, and what is allowed."""
     assert output.discrepancy is not None and output.allowed is not None
     median, low, high = (100.0 * value for value in output.discrepancy)
@@ -192,7 +185,7 @@ def _output_words(name: str, output: OutputAnswer) -> str:
     return f"{off}, Bayes factor {output.evidence:.3g}"
 
 
-def _hidden(calibration: Calibration) -> list[str]:
+def _hidden(calibration: identification.Calibration) -> list[str]:
     """What could hide in each output."""
     outputs = calibration.outputs.items()
     return [
@@ -200,7 +193,7 @@ def _hidden(calibration: Calibration) -> list[str]:
     ]
 
 
-def _hidden_words(name: str, output: OutputAnswer, resolution: float) -> str:
+def _hidden_words(name: str, output: identification.OutputAnswer, resolution: float) -> str:
     """The offset of an output's sensor that would not be seen, and the inputs that it moves most."""
     shares = sorted(output.moves_sd.items(), key=lambda pair: -abs(pair[1]))
     named = [key for place, (key, share) in enumerate(shares[:MOST_MOVED]) if place == 0 or abs(share) >= MOVED]
@@ -209,21 +202,21 @@ def _hidden_words(name: str, output: OutputAnswer, resolution: float) -> str:
     return f"{words} and moves {moves}" if moves else words
 
 
-def write(calibration: Calibration, folder: Path, identity: Identity) -> None:
+def write(calibration: identification.Calibration, folder: Path, identity: Identity) -> None:
     """Tables, the posterior sample with its verdict, pictures, the page and the workbook of these, calibration.json."""
     with_report(folder, identity, partial(blocks, calibration), partial(_write_parts, calibration))
     # Last, as it marks the folder as complete.
     write_json(folder / RECORD, calibration.as_dict())
 
 
-def signed(calibration: Calibration) -> Calibration:
+def signed(calibration: identification.Calibration) -> identification.Calibration:
     """The calibration with the digest by which a folder's record is recognized as unchanged."""
     record = calibration.as_dict()
     sign(record)
     return replace(calibration, sha256=record["sha256"])
 
 
-def _write_parts(calibration: Calibration, folder: Path) -> list[str]:
+def _write_parts(calibration: identification.Calibration, folder: Path) -> list[str]:
     """measured.csv, the posterior sample with its verdict, and the pictures; returns their names."""
     measured_sheet(calibration).save(folder)
     draw_compared(calibration.cells, folder / COMPARED)
@@ -243,27 +236,27 @@ def write_sample(rows: Sequence[Mapping[str, Any]], path: Path) -> None:
         csv.writer(file).writerows(map(text_of, row) for row in (list(rows[0]), *(row.values() for row in rows)))
 
 
-def _parts(calibration: Calibration) -> list[str]:
+def _parts(calibration: identification.Calibration) -> list[str]:
     return [MEASURED, *((SAMPLE, OF_SAMPLE, CORNER) if calibration.posterior else ()), COMPARED]
 
 
-def files_of(calibration: Calibration) -> list[str]:
+def files_of(calibration: identification.Calibration) -> list[str]:
     """Names of the files of a calibration."""
     return [RECORD, *_parts(calibration), REPORT, WORKBOOK]
 
 
-def stored(folder: Path, made_of: str) -> Calibration | None:
+def stored(folder: Path, made_of: str) -> identification.Calibration | None:
     """The calibration in a folder, if the same code made it for the same question and its files are complete."""
     try:
         record = read_json(folder / RECORD)
-        calibration = Calibration.from_dict(record)
+        calibration = identification.Calibration.from_dict(record)
     except (OSError, ValueError, KeyError, TypeError, AttributeError):
         return None
     complete = intact(record) and calibration.made_of == made_of
     return calibration if complete and all((folder / name).exists() for name in files_of(calibration)) else None
 
 
-def draw_corner(calibration: Calibration, evidence: Evidence, path: Path) -> None:
+def draw_corner(calibration: identification.Calibration, evidence: identification.Evidence, path: Path) -> None:
     """The posterior of the inputs that contract most: each over its range before, each pair as a cloud."""
     from rbdyn.plots.style import BLUE, GREY, plain, save, subplots
 
@@ -313,7 +306,7 @@ def _along(entry: Input, low: float, high: float, count: int) -> list[float]:
     return values
 
 
-def draw_compared(cells: Sequence[Cell], path: Path) -> None:
+def draw_compared(cells: Sequence[identification.Cell], path: Path) -> None:
     """A panel for each output: deviations of the simulation before and after, by row, in percent of the measured values."""
     from rbdyn.plots.style import BLUE, GREY, ORANGE, VERMILION, plain, save, subplots
 

@@ -11,48 +11,14 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from rbdyn import losses
 from rbdyn.compiled.elementary import fast_cos_sin
 from rbdyn.compiled.kernel import entry, kernel, routine
 from rbdyn.contact.hertz_line import line_energy, line_load
-from rbdyn.dynamics.forces import state
-from rbdyn.dynamics.forces.bodies import (
-    RingMotion,
-    action,
-    add_weight,
-    cage_acceleration,
-    cage_kinetic_energy,
-    drag_forces,
-    height_energy,
-    load_potential,
-    load_power,
-    mass_centre,
-    outer_motion,
-    support_energy,
-    support_motion,
-    tick,
-)
+from rbdyn.dynamics.forces import bodies, state
 from rbdyn.dynamics.forces.cage import guide_energy, guide_forces, pocket_contact, pocket_energy, pocket_gap
 from rbdyn.dynamics.forces.race_lanes import race_forces, with_open_films
 from rbdyn.dynamics.forces.races import Race, form_at, roller_radius
-from rbdyn.losses import (
-    DRAG,
-    INNER_ROLLING,
-    INNER_TRACTION,
-    LAND_DAMPING,
-    LAND_FILM,
-    LAND_FRICTION,
-    LOAD,
-    OUTER_TRACTION,
-    POCKET_DAMPING,
-    POCKET_FILM,
-    POCKET_FORCE,
-    POCKET_FRICTION,
-    POCKET_SQUEEZE,
-    RACE_DAMPING,
-    ROLLING,
-    SHAFT,
-    SUPPORT_DAMPING,
-)
 
 
 class RollerBearing(NamedTuple):
@@ -115,7 +81,7 @@ def pocket_direction(bearing, cosine, sine, j):
 def cage_motion(y, body):
     """Motion of the cage, whose coordinates begin at ``body``; its mark is the mid-line of the first pocket."""
     cosine, sine = fast_cos_sin(y[body + state.CAGE_ANGLE])
-    return RingMotion(
+    return bodies.RingMotion(
         y[body + state.CAGE_X],
         y[body + state.CAGE_Y],
         y[body + state.CAGE_VX],
@@ -129,7 +95,7 @@ def cage_motion(y, body):
 @kernel
 def inner_motion(y, body, acting):
     """Motion of the inner ring."""
-    return RingMotion(
+    return bodies.RingMotion(
         y[body + state.RING_X],
         y[body + state.RING_Y],
         y[body + state.RING_VX],
@@ -144,8 +110,8 @@ def inner_motion(y, body, acting):
 def motions(bearing, y):
     """``Action`` on the bearing in a state, and the motions of cage, inner and outer ring."""
     body = state.ROLLER_STATES * roller_count(bearing)
-    acting = action(bearing.drive, y)
-    outer = outer_motion(bearing.outer_ring, y, acting.outer_speed, acting.outer_cos, acting.outer_sin)
+    acting = bodies.action(bearing.drive, y)
+    outer = bodies.outer_motion(bearing.outer_ring, y, acting.outer_speed, acting.outer_cos, acting.outer_sin)
     return acting, cage_motion(y, body), inner_motion(y, body, acting), outer
 
 
@@ -239,7 +205,7 @@ def accelerate_rollers(bearing, row, dy):
         dy[row, 2 * z + j] *= per_mass
         dy[row, 3 * z + j] *= per_mass
         dy[row, 4 * z + j] *= per_inertia
-    add_weight(bearing.gravity, 2 * z, z, row, dy)
+    bodies.add_weight(bearing.gravity, 2 * z, z, row, dy)
 
 
 @kernel
@@ -247,14 +213,14 @@ def accelerate_cage(bearing, cage, pockets, land, row, dy):
     """Rates of the cage's coordinates into row ``row`` of ``dy``."""
     body = state.ROLLER_STATES * roller_count(bearing)
     fx, fy, moment = pockets.x + land.cage_x, pockets.y + land.cage_y, pockets.moment + land.cage_moment
-    ax, ay, spin_up = cage_acceleration(bearing.cage, fx, fy, moment, cage.cos, cage.sin, cage.speed)
+    ax, ay, spin_up = bodies.cage_acceleration(bearing.cage, fx, fy, moment, cage.cos, cage.sin, cage.speed)
     dy[row, body + state.CAGE_X] = cage.vx
     dy[row, body + state.CAGE_Y] = cage.vy
     dy[row, body + state.CAGE_ANGLE] = cage.speed
     dy[row, body + state.CAGE_VX] = ax
     dy[row, body + state.CAGE_VY] = ay
     dy[row, body + state.CAGE_SPEED] = spin_up
-    add_weight(bearing.gravity, body + state.CAGE_VX, 1, row, dy)
+    bodies.add_weight(bearing.gravity, body + state.CAGE_VX, 1, row, dy)
 
 
 @kernel
@@ -265,7 +231,7 @@ def accelerate_inner_ring(bearing, inner, fx, fy, row, dy):
     dy[row, body + state.RING_Y] = inner.vy
     dy[row, body + state.RING_VX] = fx / bearing.inner_ring_mass
     dy[row, body + state.RING_VY] = fy / bearing.inner_ring_mass
-    add_weight(bearing.gravity, body + state.RING_VX, 1, row, dy)
+    bodies.add_weight(bearing.gravity, body + state.RING_VX, 1, row, dy)
 
 
 @kernel
@@ -273,8 +239,8 @@ def derivative(bearing, y, row, dy, power, loads, scratch):
     """Fill row ``row`` of ``dy``, of the powers [W] and of the largest loads [N], for the state ``y``."""
     z = roller_count(bearing)
     acting, cage, inner, outer = motions(bearing, y)
-    tick(bearing.drive, acting, row, dy)
-    drag_loss = drag_forces(bearing.drag, z, y, row, dy)
+    bodies.tick(bearing.drive, acting, row, dy)
+    drag_loss = bodies.drag_forces(bearing.drag, z, y, row, dy)
     for j in range(z):
         dy[row, j], dy[row, z + j], dy[row, 4 * z + j] = y[2 * z + j], y[3 * z + j], 0.0
     touching = touching_rollers(bearing, cage, y, scratch)
@@ -288,25 +254,25 @@ def derivative(bearing, y, row, dy, power, loads, scratch):
     ring_fx, ring_fy = on_inner.x + land.inner_x + acting.load_x, on_inner.y + land.inner_y + acting.load_y
     accelerate_inner_ring(bearing, inner, ring_fx, ring_fy, row, dy)
     support_fx, support_fy = on_outer.x + land.outer_x, on_outer.y + land.outer_y
-    support_loss = support_motion(bearing.outer_ring, bearing.gravity, support_fx, support_fy, y, row, dy)
-    power[row, OUTER_TRACTION] = on_outer.traction
-    power[row, INNER_TRACTION] = on_inner.traction
-    power[row, ROLLING] = on_outer.rolling + on_inner.rolling
-    power[row, RACE_DAMPING] = on_outer.damping + on_inner.damping
-    power[row, POCKET_FRICTION] = pockets.friction
-    power[row, POCKET_DAMPING] = pockets.damping
-    power[row, POCKET_FILM] = pockets.film
-    power[row, LAND_FILM] = land.film
-    power[row, LAND_FRICTION] = land.friction
-    power[row, LAND_DAMPING] = land.damping
-    power[row, DRAG] = drag_loss
-    power[row, SUPPORT_DAMPING] = support_loss
+    support_loss = bodies.support_motion(bearing.outer_ring, bearing.gravity, support_fx, support_fy, y, row, dy)
+    power[row, losses.OUTER_TRACTION] = on_outer.traction
+    power[row, losses.INNER_TRACTION] = on_inner.traction
+    power[row, losses.ROLLING] = on_outer.rolling + on_inner.rolling
+    power[row, losses.RACE_DAMPING] = on_outer.damping + on_inner.damping
+    power[row, losses.POCKET_FRICTION] = pockets.friction
+    power[row, losses.POCKET_DAMPING] = pockets.damping
+    power[row, losses.POCKET_FILM] = pockets.film
+    power[row, losses.LAND_FILM] = land.film
+    power[row, losses.LAND_FRICTION] = land.friction
+    power[row, losses.LAND_DAMPING] = land.damping
+    power[row, losses.DRAG] = drag_loss
+    power[row, losses.SUPPORT_DAMPING] = support_loss
     inner_moment, outer_moment = on_inner.moment + land.inner_moment, on_outer.moment + land.outer_moment
-    power[row, SHAFT] = -inner_moment * inner.speed - outer_moment * outer.speed
-    power[row, LOAD] = load_power(bearing.drive, acting, inner.vx, inner.vy)
-    power[row, INNER_ROLLING] = on_inner.rolling
-    power[row, POCKET_FORCE] = pockets.force
-    power[row, POCKET_SQUEEZE] = pockets.squeeze
+    power[row, losses.SHAFT] = -inner_moment * inner.speed - outer_moment * outer.speed
+    power[row, losses.LOAD] = bodies.load_power(bearing.drive, acting, inner.vx, inner.vy)
+    power[row, losses.INNER_ROLLING] = on_inner.rolling
+    power[row, losses.POCKET_FORCE] = pockets.force
+    power[row, losses.POCKET_SQUEEZE] = pockets.squeeze
     loads[row, state.POCKET_LOAD] = pockets.load
     loads[row, state.OUTER_LOAD] = on_outer.load
     loads[row, state.INNER_LOAD] = on_inner.load
@@ -350,20 +316,20 @@ def mechanical_energy(bearing, y):
     """(kinetic, elastic, potential) energy [J] of a state, without the prescribed rotation of the rings."""
     z = bearing.rollers
     _, cage, inner, outer = motions(bearing, y)
-    kinetic, elastic, potential = support_energy(bearing.outer_ring, bearing.gravity, y)
-    kinetic += cage_kinetic_energy(bearing.cage, cage.vx, cage.vy, cage.cos, cage.sin, cage.speed)
+    kinetic, elastic, potential = bodies.support_energy(bearing.outer_ring, bearing.gravity, y)
+    kinetic += bodies.cage_kinetic_energy(bearing.cage, cage.vx, cage.vy, cage.cos, cage.sin, cage.speed)
     kinetic += 0.5 * bearing.inner_ring_mass * (inner.vx**2 + inner.vy**2)
     elastic += guide_energy(bearing.guide, cage.x, cage.y, inner.x, inner.y, outer.x, outer.y)
-    centre_x, centre_y = mass_centre(bearing.cage, cage.x, cage.y, cage.cos, cage.sin)
-    potential += load_potential(bearing.drive, inner.x)
-    potential += height_energy(bearing.gravity, bearing.cage.mass, centre_x, centre_y)
-    potential += height_energy(bearing.gravity, bearing.inner_ring_mass, inner.x, inner.y)
+    centre_x, centre_y = bodies.mass_centre(bearing.cage, cage.x, cage.y, cage.cos, cage.sin)
+    potential += bodies.load_potential(bearing.drive, inner.x)
+    potential += bodies.height_energy(bearing.gravity, bearing.cage.mass, centre_x, centre_y)
+    potential += bodies.height_energy(bearing.gravity, bearing.inner_ring_mass, inner.x, inner.y)
     for j in range(z):
         x, y_ = y[j], y[z + j]
         radius = roller_radius(bearing.sizes, j)
         kinetic += 0.5 * bearing.roller_mass * (y[2 * z + j] ** 2 + y[3 * z + j] ** 2)
         kinetic += 0.5 * bearing.roller_inertia * y[4 * z + j] ** 2
-        potential += height_energy(bearing.gravity, bearing.roller_mass, x, y_)
+        potential += bodies.height_energy(bearing.gravity, bearing.roller_mass, x, y_)
         elastic += race_energy(bearing.outer, 1.0, radius, x - outer.x, y_ - outer.y, outer)
         elastic += race_energy(bearing.inner, -1.0, radius, x - inner.x, y_ - inner.y, inner)
         ex, ey = pocket_direction(bearing, cage.cos, cage.sin, j)

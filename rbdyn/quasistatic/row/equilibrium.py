@@ -7,19 +7,8 @@ import numpy as np
 
 from rbdyn.base.arrays import Array
 from rbdyn.compiled.kernel import entry, routine
-from rbdyn.quasistatic.row import newton
+from rbdyn.quasistatic.row import newton, ring
 from rbdyn.quasistatic.row.ball import Control, ball_forces, spring
-from rbdyn.quasistatic.row.ring import (
-    INNER_DEPTH,
-    LOADED,
-    OUTER_DEPTH,
-    REACTION,
-    RING,
-    Row,
-    component_lengths,
-    groove_centre,
-    unbalance,
-)
 
 # Figures of a ball.
 INNER_LOAD, OUTER_LOAD, INNER_ANGLE, OUTER_ANGLE, PULL, MOMENT, FIGURES = range(7)
@@ -99,16 +88,16 @@ def fill_figures(task: Any, state: Any, figures: Any) -> None:
     """Fill ``figures`` (Z, FIGURES) with loads, angles, centrifugal forces and gyroscopic moments, after ``assemble``."""
     row, balls = task.row, state.balls
     for j in range(row.cosine.size):
-        a_axial, a_radial = groove_centre(row, state.q, j)
+        a_axial, a_radial = ring.groove_centre(row, state.q, j)
         x, y = balls[j, 0], balls[j, 1]
         figures[j, INNER_ANGLE] = math.atan2(a_axial - x, a_radial - y)
         figures[j, OUTER_ANGLE] = math.atan2(x, y)
-        figures[j, INNER_LOAD], _ = spring(balls[j, INNER_DEPTH], row.inner_stiffness)
-        figures[j, OUTER_LOAD], _ = spring(balls[j, OUTER_DEPTH], row.outer_stiffness)
+        figures[j, INNER_LOAD], _ = spring(balls[j, ring.INNER_DEPTH], row.inner_stiffness)
+        figures[j, OUTER_LOAD], _ = spring(balls[j, ring.OUTER_DEPTH], row.outer_stiffness)
         figures[j, PULL], figures[j, MOMENT] = row.centrifugal_force, 0.0
-        if state.work[j, LOADED] > 0.0:
+        if state.work[j, ring.LOADED] > 0.0:
             _, _, _, _, _, _, figures[j, PULL], figures[j, MOMENT] = ball_forces(
-                task.control, 1.0, row, a_axial, a_radial, x, y, balls[j, INNER_DEPTH], balls[j, OUTER_DEPTH]
+                task.control, 1.0, row, a_axial, a_radial, x, y, balls[j, ring.INNER_DEPTH], balls[j, ring.OUTER_DEPTH]
             )
         else:
             # A lifted ball touches the outer race alone and has no inner angle of its own.
@@ -121,13 +110,13 @@ def solve_row(task: Any, warm: bool, state: Any, figures: Any) -> tuple[int, flo
     """``newton.find`` the equilibrium and fill ``figures`` (Z, FIGURES). Returns the outcome and the residual [N]."""
     state.counts[:] = 0
     outcome = newton.find(task, warm, state)
-    _, worst = unbalance(task, state)
+    _, worst = ring.unbalance(task, state)
     fill_figures(task, state, figures)
     return outcome, worst
 
 
 def solve(
-    row: Row, control: Control, load: Array, constraint: Array | None = None, start: Solution | None = None
+    row: ring.Row, control: Control, load: Array, constraint: Array | None = None, start: Solution | None = None
 ) -> Solution:
     """Equilibrium of a row under ``load`` (Fx, Fy, Fz [N], Mx, My [N m]) on the inner ring.
 
@@ -139,24 +128,24 @@ def solve(
     state, figures = newton.space(size), np.zeros((size, FIGURES))
     state.q[:] = displacement
     if start is not None:
-        state.q[:] = np.where(free > 0.0, start.displacement * component_lengths(row.lever), displacement)
+        state.q[:] = np.where(free > 0.0, start.displacement * ring.component_lengths(row.lever), displacement)
         state.balls[:] = np.hstack((start.balls, start.depths))
     outcome, worst = solve_row(newton.Task(control, row, force, free), start is not None, state, figures)
     return solution_of(row, state, figures, OK if outcome == newton.CONVERGED else SENTENCES.get(outcome, LOST), worst)
 
 
 def solution_of(
-    row: Row, state: newton.Space, figures: Array, status: str, residual: float, searches: int | None = None
+    row: ring.Row, state: newton.Space, figures: Array, status: str, residual: float, searches: int | None = None
 ) -> Solution:
     """Solution in its own units and names, from the state at the end of a solve."""
-    unit = component_lengths(row.lever)
+    unit = ring.component_lengths(row.lever)
     q, reaction, matrix, figures = without_rounding(
-        state.q, state.sums[REACTION : REACTION + RING], state.matrix, figures, row.lever
+        state.q, state.sums[ring.REACTION : ring.REACTION + ring.RING], state.matrix, figures, row.lever
     )
     return Solution(
         displacement=q / unit,
-        balls=state.balls[:, :INNER_DEPTH],
-        depths=state.balls[:, INNER_DEPTH:],
+        balls=state.balls[:, : ring.INNER_DEPTH],
+        depths=state.balls[:, ring.INNER_DEPTH :],
         inner_load=figures[:, INNER_LOAD],
         outer_load=figures[:, OUTER_LOAD],
         inner_angle=figures[:, INNER_ANGLE],
