@@ -22,12 +22,8 @@ Saved = TypeVar("Saved")
 OF_FIGURE, HALF_WIDTHS = "of the result", "half widths of the 95 % intervals"
 
 
-class Quantity(Record):
-    """A figure with the half-widths of its 95 % intervals; None where an error was not estimated.
-
-    ``effective_samples``: number of independent batches that would carry as much information as those of the run;
-    ``degrees_of_freedom``: of Student's t in the statistical error, None without one.
-    """
+class SimulatedValue(Record):
+    """A simulated value with the half-widths of its 95 % intervals; None where an error was not estimated."""
 
     value: float = shown(
         "value", cell=lambda figure: figure.value_text, unit=OF_FIGURE, meaning="mean over all turns and replicates"
@@ -38,8 +34,6 @@ class Quantity(Record):
     numerical_error: float | None = shown(
         "numerical error (95 %)", error_alone, missing="not estimated", unit=OF_FIGURE, meaning=HALF_WIDTHS
     )
-    effective_samples: float = written("independent samples behind the statistical error")
-    degrees_of_freedom: int | None = written("those of Student's t in the statistical error", default=None)
 
     @property
     def error(self) -> float | None:
@@ -49,11 +43,6 @@ class Quantity(Record):
         """
         errors = [error for error in (self.statistical_error, self.numerical_error) if error is not None]
         return math.hypot(*errors) if errors else None
-
-    def __str__(self) -> str:
-        parts = {"statistical": self.statistical_error, "numerical": self.numerical_error}
-        errors = [f"{error_alone(error)} ({kind})" for kind, error in parts.items() if error is not None]
-        return " ".join((self.value_text, *errors))
 
     @property
     def stated_error(self) -> float | None:
@@ -72,6 +61,27 @@ class Quantity(Record):
     def value_text(self) -> str:
         """The value to the digits that its stated error bears; to five without one."""
         return value_alone(self.value, self.stated_error)
+
+    @property
+    def simulated_value(self) -> "SimulatedValue":
+        """The value with its errors and nothing else."""
+        return SimulatedValue(self.value, self.statistical_error, self.numerical_error)
+
+
+class Quantity(SimulatedValue):
+    """A figure with its errors, and what these rest on.
+
+    ``effective_samples``: number of independent batches that would carry as much information as those of the run;
+    ``degrees_of_freedom``: of Student's t in the statistical error, None without one.
+    """
+
+    effective_samples: float = written("independent samples behind the statistical error")
+    degrees_of_freedom: int | None = written("those of Student's t in the statistical error", default=None)
+
+    def __str__(self) -> str:
+        parts = {"statistical": self.statistical_error, "numerical": self.numerical_error}
+        errors = [f"{error_alone(error)} ({kind})" for kind, error in parts.items() if error is not None]
+        return " ".join((self.value_text, *errors))
 
 
 def arrays_of(figures: Sequence[Any]) -> Any:

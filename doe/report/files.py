@@ -240,7 +240,7 @@ def confirmation_sheet(
             **point.factors,
             "response": response,
             **value.as_dict(),
-            "joint_error": value.joint_error,
+            "joint_error": value.error,
             "gain": (point.gains or {}).get(response),
             "judged": point.limits.get(response),
         }

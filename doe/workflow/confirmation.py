@@ -23,7 +23,7 @@ from rbdyn.base.faults import InputError, RunError
 from rbdyn.base.notes import DANGER, Note, Notes, condensed, of_level
 from rbdyn.base.records import Record, derived, finite, keyed, outside_json, spread
 from rbdyn.base.words import chance, decimals, improvement, quantity, with_error
-from rbdyn.result import TEMPERATURES, FrictionCheck, Quantity, arrays_of
+from rbdyn.result import TEMPERATURES, FrictionCheck, Quantity, SimulatedValue, arrays_of
 from rbdyn.scene import Scene
 from rbdyn.scene.thermal import simulated_scene
 from rbdyn.verdict.orbits import CageVerdict
@@ -402,38 +402,6 @@ def worst_limits(limits: Sequence[Limit]) -> dict[str, Limit]:
 def verdict_of(limits: Sequence[Limit]) -> Verdict:
     """The worst verdict; kept without limits."""
     return max((limit.verdict for limit in limits), key=ORDER.index, default="kept")
-
-
-class SimulatedValue(Record):
-    """A simulated response with the half-widths of its 95 % intervals, None where one was not estimated."""
-
-    value: float
-    statistical_error: float | None
-    numerical_error: float | None
-
-    @property
-    def error(self) -> float | None:
-        """Half-width of both together; None where the statistical one is unknown, as for ``Quantity.stated_error``."""
-        return (
-            None if self.statistical_error is None else math.hypot(self.statistical_error, self.numerical_error or 0.0)
-        )
-
-    @property
-    def joint_error(self) -> float | None:
-        """Half-width of the errors that are known; None where neither is."""
-        if self.statistical_error is None and self.numerical_error is None:
-            return None
-        return float(np.hypot(self.statistical_error or 0.0, self.numerical_error or 0.0))
-
-    @property
-    def text(self) -> str:
-        """The value with its error."""
-        return with_error(self.value, self.error)
-
-    @classmethod
-    def of(cls, quantity: Quantity) -> "SimulatedValue":
-        """The value of a quantity with both errors."""
-        return cls(quantity.value, quantity.statistical_error, quantity.numerical_error)
 
 
 class Balance(Record):

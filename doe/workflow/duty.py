@@ -11,7 +11,7 @@ from typing import Any
 
 from doe.duty import DutyResult, scenes_of
 from doe.study_file.study import PointResponse, Response
-from doe.workflow.confirmation import Confirmed, Gain, SimulatedValue, gains
+from doe.workflow.confirmation import Confirmed, Gain, gains
 from doe.workflow.front import find_front, out_of_reach
 from doe.workflow.problem import Problem
 from doe.workflow.runs import Runs
@@ -21,7 +21,7 @@ from rbdyn.base.faults import InputError
 from rbdyn.base.records import Record, finite, keyed
 from rbdyn.base.words import chance
 from rbdyn.life import DutyLife, DutyLifeFigures
-from rbdyn.result import arrays_of
+from rbdyn.result import SimulatedValue, arrays_of
 from rbdyn.scene import Scene
 
 # Most generations of the search for the pick of a point alone, of which no run is made.
@@ -112,7 +112,7 @@ def duty_answer(study: Problem, runs: Runs, confirmed: Mapping[str, Confirmed]) 
         except InputError as error:
             note = f"{name} alone has no selected design: {'; '.join(error.faults)}"
         before, after = (
-            {figure: SimulatedValue.of(quantity) for figure, quantity in end.at_points[name].items()}
+            {figure: quantity.simulated_value for figure, quantity in end.at_points[name].items()}
             for end in (baseline, pick)
         )
         at_ends = gains(here, *ends)

@@ -11,7 +11,6 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from doe.workflow.confirmation import SimulatedValue
 from rbdyn.base.words import error_alone, signed_with_error, value_alone, with_error
 from rbdyn.result import Quantity
 
@@ -66,8 +65,8 @@ def test_invariant_no_other_place_formats_a_value_with_its_error(folder):
 def test_unit_a_value_without_a_statistical_error_has_five_digits():
     """Unit: an error of the time steps alone bears no digits of a figure that scatters."""
     alone = Quantity(212.00564, None, 0.00039, 1.0)
-    assert alone.value_text == "212.01" and alone.stated_error is None and SimulatedValue.of(alone).error is None
-    assert SimulatedValue.of(Quantity(212.00564, 0.3, 0.4, 9.0)).error == pytest.approx(0.5)
+    assert alone.value_text == "212.01" and alone.stated_error is None and alone.simulated_value.stated_error is None
+    assert Quantity(212.00564, 0.3, 0.4, 9.0).simulated_value.error == pytest.approx(0.5)
     assert (
         Quantity(212.00564, 0.35, 0.00039, 1.0).value_text == "212.01"
         and Quantity(212.0, None, None, 1.0).value_text == "212"

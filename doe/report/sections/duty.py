@@ -9,13 +9,14 @@ from typing import TYPE_CHECKING, NamedTuple
 from doe.report.still import COLOURS, GUIDE, Still, name_marks
 from doe.report.summary import LIMITS, SIGNS_NOTE, Summary, change, signed
 from doe.study_file.sections import at_point
-from doe.workflow.confirmation import ORDER, Gain, PickLimit, SimulatedValue
+from doe.workflow.confirmation import ORDER, Gain, PickLimit
 from doe.workflow.duty import AtPoint, DutyAnswer, LifeOverDuty
 from doe.workflow.problem import Factor
 from doe.workflow.surfaces import PredictedGain
 from rbdyn.base.blocks import Block, Column, Detail, Figures, Paragraph, Section, Sheet, Table
 from rbdyn.base.faults import one_line
 from rbdyn.base.words import label, quantity, shown, with_error
+from rbdyn.result import SimulatedValue
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -167,7 +168,8 @@ def _means(points: Sequence[AtPoint], name: str) -> list[str]:
     means = []
     for values in ([point.baseline[name] for point in timed], [point.pick[name] for point in timed]):
         shares = [point.share for point in timed]
-        known = [share * value.error for share, value in zip(shares, values, strict=True) if value.error is not None]
+        errors = [value.stated_error for value in values]
+        known = [share * error for share, error in zip(shares, errors, strict=True) if error is not None]
         mean = math.fsum(share * value.value for share, value in zip(shares, values, strict=True))
         means.append(with_error(mean, math.hypot(*known) if len(known) == len(shares) else None))
     return means
@@ -296,12 +298,12 @@ DUTY_COLUMNS: tuple[Column[DutyFigure], ...] = (
     Column("pick", words="selected", at=("pick", "value"), cell=lambda row: row.pick.text),
     Column(
         "baseline_error",
-        at=("baseline", "error"),
+        at=("baseline", "stated_error"),
         screen=False,
         unit="of the response",
         meaning="half widths of the 95 % intervals",
     ),
-    Column("pick_error", at=("pick", "error"), screen=False),
+    Column("pick_error", at=("pick", "stated_error"), screen=False),
     Column(
         "improvement_percent",
         words="change",

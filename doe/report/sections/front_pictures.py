@@ -216,7 +216,7 @@ class Fronts(Record):
 def _simulated(point: ConfirmedPoint, first: str, second: str) -> Simulated:
     """Two responses of a confirmed point with the half-widths of their intervals."""
     x, y = (point.responses[name] for name in (first, second))
-    return (x.value, y.value), (x.error, y.error)
+    return (x.value, y.value), (x.stated_error, y.stated_error)
 
 
 def _data(kind: str, axes: Sequence[Coordinate], still: Still) -> str:
