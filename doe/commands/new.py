@@ -120,11 +120,8 @@ def new(
     """Create a commented study file for the clearances of a scene file."""
     with command.guarded(as_json):
         from doe.study_file.study import StudyFile
+        from doe.workflow import front, problem, region, whole
         from doe.workflow.effort import Effort
-        from doe.workflow.front import check_goals
-        from doe.workflow.problem import Problem
-        from doe.workflow.region import region_that_runs
-        from doe.workflow.whole import check_study
         from rbdyn.base.faults import read_toml, validated
         from rbdyn.scene import DrawnScene, rollers_only
 
@@ -136,17 +133,17 @@ def new(
         factors = _factors(read_toml(path))
         values = {"quoted": _quoted_path(path, out), "hours": "true" if hours else None}
 
-        def written(factors: list[Factor], discarded: int = DISCARDED) -> tuple[str, Problem]:
+        def written(factors: list[Factor], discarded: int = DISCARDED) -> tuple[str, problem.Problem]:
             parts = _sections(scene, factors, tolerances, chains)
             text = _filled(parts | sections, values | _numerics(scene, discarded))
             file = validated(StudyFile, tomllib.loads(text), f"study of {path}")
-            return text, Problem(out or Path("study.toml"), file)
+            return text, problem.Problem(out or Path("study.toml"), file)
 
         text, study = written(factors)
-        check_goals(study)
+        front.check_goals(study)
         with tempfile.TemporaryDirectory() as temporary:
             folder, effort = Path(temporary), Effort(notice=command.notice(False))
-            moved = region_that_runs(study, folder, effort, kept=1.0).study
+            moved = region.region_that_runs(study, folder, effort, kept=1.0).study
             if moved is not study:
                 sections["baseline"], factors = _baseline(moved), _moved(factors, study, moved)
                 text, study = written(factors)
@@ -157,7 +154,7 @@ def new(
             if cages and len(slow := slow_points(study, folder, effort)) < len(cages):
                 sections["duty"] = duty_text(points, hours, slow)
                 text, study = written(factors, FEWER)
-        check_study(study)
+        whole.check_study(study)
         command.hand_out(text, as_json, out, force, "doe study", reads)
 
 
