@@ -36,7 +36,15 @@ from rbdyn.result import HeatBalance, Quantity, Ranges, SimulationResult
 from rbdyn.scene import Scene
 from rbdyn.scene.input_ranges import input_ranges
 from rbdyn.scene.notes import heat_notes
-from rbdyn.scene.thermal import Temperatures, Thermal, at_temperatures, inlet_temperature, part_temperatures, too_hot
+from rbdyn.scene.thermal import (
+    PART_KEYS,
+    Temperatures,
+    Thermal,
+    at_temperatures,
+    inlet_temperature,
+    part_temperatures,
+    too_hot,
+)
 from rbdyn.thermal.fixed_point import CLEAR, TOLERANCE, VAGUE, State, learned, model_of, next_step, steady_state
 from rbdyn.thermal.losses import HOTTEST, HeatModel, gain, log_viscosity, no_residue
 from rbdyn.thermal.network import NODES, carried_off
@@ -451,9 +459,11 @@ def _ranges(scene: Scene, hot: Scene, path: Sequence[State], slopes: Array) -> R
     mounting = hot.mounting
     assert mounting is not None
 
-    def clearances(nodes: Array, thermal: Thermal) -> dict[str, float]:
-        mounted = mounting.model_copy(update=part_temperatures(thermal, Temperatures(*nodes.tolist())))
-        return {f"{name}_um": 1e6 * play for name, play in hot.clearances_of(mounted).items()}
+    def clearances(nodes: Array, thermals: Sequence[Thermal]) -> dict[str, Array]:
+        keys = {name: np.array([getattr(each, name) for each in thermals]) for name in PART_KEYS}
+        parts = part_temperatures(thermals[0].model_copy(update=keys), Temperatures(*nodes.T))
+        plays = hot.clearances_of(mounting.model_copy(update=parts))
+        return {f"{name}_um": 1e6 * play + np.zeros(len(nodes)) for name, play in plays.items()}
 
     about = model_of(path).with_image_slopes(slopes)
     estimated = [] if scene.uncertain is None else scene.uncertain.estimated

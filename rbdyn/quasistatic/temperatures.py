@@ -389,9 +389,12 @@ def ranges_of(scene: SingleRowScene, state: State, slopes: Array) -> Ranges:
         search = steady_state(map_of_set, start, cold, _exact_slopes, near, RANGE_TOLERANCE)
         return search.last.temperatures if search.status == "steady" else None
 
-    def clearances(nodes: Array, thermal: Thermal) -> dict[str, float]:
+    def radial(nodes: Array, thermal: Thermal) -> float:
         changed = scene.model_copy(update={"thermal": thermal})
-        return {"radial_um": 1e6 * clearance_of(row_of(at_temperatures(changed, Temperatures(*nodes.tolist()))).row)[0]}
+        return 1e6 * clearance_of(row_of(at_temperatures(changed, Temperatures(*nodes.tolist()))).row)[0]
+
+    def clearances(nodes: Array, thermals: Sequence[Thermal]) -> dict[str, Array]:
+        return {"radial_um": np.array([*map(radial, nodes, thermals)])}
 
     return input_ranges(scene, about, lambda share: term_shares(scene, share), clearances, {}, full=full)
 

@@ -44,8 +44,8 @@ SETS, SEED, QUANTILES = 256, 1, (0.05, 0.5, 0.95)
 Levels = Mapping[str, Callable[[float], Array]]
 # Of a set of inputs: keys of [thermal], ratios of conductances by name, and losses (terms,) over the usual ones.
 Varied = tuple["Thermal", dict[str, float], Array]
-# Clearances in operation [um] by name, at temperatures of the nodes (4,) [C] and with keys of [thermal]. Raises ValueError.
-Clearances = Callable[[Array, "Thermal"], Mapping[str, float]]
+# Clearances in operation (n,) [um] by name, at temperatures of the nodes (n, 4) [C], each with keys of [thermal]. Raises ValueError.
+Clearances = Callable[[Array, Sequence["Thermal"]], Mapping[str, Array]]
 # Shares of the nodes in the losses (terms, 4) by the share of a film's heat that its oil takes.
 Shares = Callable[[float], Array]
 # Steady temperatures (4,) [C] with keys of [thermal] by a full solution from a first guess (4,) [C], None where there are none.
@@ -69,23 +69,23 @@ def input_ranges(
     thermal = scene.thermal
     assert thermal is not None
     sets = input_sets(scene, levels, estimated)
+    varied = list(varied_inputs(thermal, sets, levels))
     dry, wet = shares(0.0), shares(1.0)
-    rows, others = [], list[Mapping[str, float]]()
-    for changed, ratios, level in varied_inputs(thermal, sets, levels):
-        varied = model.varied(ratios, level, dry + changed.film_share_to_oil * (wet - dry))
-        guess = varied.balanced()
-        stable = varied.is_stable(guess)
-        nodes = guess if stable else None
-        if full is not None:
-            nodes = full(changed, guess if stable else model.losses.temperatures)
-        if nodes is None:
-            rows.append(np.full(len(NODES), HOTTEST))
-            continue
-        rows.append(nodes)
-        others.append({DIFFERENCE: float(nodes[INNER] - nodes[OUTER]), **clearances(nodes, changed)})
-    table = np.array(rows)
+    to_oil = np.array([changed.film_share_to_oil for changed, *_ in varied])[:, np.newaxis, np.newaxis]
+    ratios = {name: np.array([each[name] for _, each, _ in varied]) for name in varied[0][1]}
+    models = model.varied(ratios, np.array([level for *_, level in varied]), dry + to_oil * (wet - dry))
+    table = models.balanced()
+    steady = models.is_stable(table)
+    if full is not None:
+        guesses = np.where(steady[:, np.newaxis], table, model.losses.temperatures)
+        found = [full(changed, guess) for (changed, *_), guess in zip(varied, guesses, strict=True)]
+        steady = np.array([nodes is not None for nodes in found])
+        table = np.array([guess if nodes is None else nodes for nodes, guess in zip(found, guesses, strict=True)])
+    table[~steady] = HOTTEST
     columns = dict(zip(NODES, table.T, strict=True))
-    columns |= {name: np.array([other[name] for other in others]) for name in (others or [{}])[0]}
+    if steady.any():
+        nodes, keys = table[steady], [varied[place][0] for place in np.flatnonzero(steady)]
+        columns |= {DIFFERENCE: nodes[:, INNER] - nodes[:, OUTER], **clearances(nodes, keys)}
     figures = {name: tuple(np.quantile(column, QUANTILES).tolist()) for name, column in columns.items()}
     return Ranges(figures, tuple(sets), float(np.mean(table.max(axis=1) >= HOTTEST)))
 

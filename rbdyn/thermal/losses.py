@@ -11,7 +11,7 @@ from typing import Literal, NamedTuple, Self
 
 import numpy as np
 
-from rbdyn.base.arrays import Array
+from rbdyn.base.arrays import Array, Mask
 from rbdyn.losses import LOSSES, Node, Partition
 from rbdyn.properties.materials import Oil
 from rbdyn.thermal.network import NODES, Boundaries, Conductances, matrix, source
@@ -77,7 +77,10 @@ def film_powers(losses: Losses, other: Losses, least_change: float, least_share:
 
 
 class HeatModel(NamedTuple):
-    """Losses about a state, ``shares`` (terms, 4) of the nodes in these, the network, and ``residue`` (4, 4) [W/K] of the heat's slopes."""
+    """Losses about a state, ``shares`` (terms, 4) of the nodes in these, the network, and ``residue`` (4, 4) [W/K] of the heat's slopes.
+
+    Of many models about one state, powers, shares and conductances are arrays (n, ...).
+    """
 
     losses: Losses
     shares: Array
@@ -87,30 +90,30 @@ class HeatModel(NamedTuple):
 
     @property
     def matrix(self) -> Array:
-        """G [W/K], (4, 4)."""
+        """G [W/K], (..., 4, 4)."""
         return matrix(self.conductances)
 
     @property
-    def coldest(self) -> float:
-        """Temperature of the colder surroundings of those that exchange heat [C]: no node is colder."""
-        conductances, boundaries = self.conductances, self.boundaries
-        ways = {
-            boundaries.inlet: conductances.flow,
-            boundaries.ambient: conductances.outer_ambient + conductances.inner_ambient + conductances.sump,
-        }
-        return min((place for place, conductance in ways.items() if conductance > 0.0), default=boundaries.ambient)
+    def coldest(self) -> Array:
+        """Temperature of the colder surroundings of those that exchange heat (...) [C]: no node is colder."""
+        conductances, (inlet, ambient) = self.conductances, self.boundaries
+        out = conductances.outer_ambient + conductances.inner_ambient + conductances.sump
+        by_oil = np.where(np.asarray(out) > 0.0, min(inlet, ambient), inlet)
+        return np.where(np.asarray(conductances.flow) > 0.0, by_oil, ambient)
 
     def heat(self, nodes: Array) -> Array:
         """Heat of the nodes (..., 4) [W] at their temperatures (..., 4) [C]."""
-        return np.asarray(self.losses.at(nodes) @ self.shares + (nodes - self.losses.temperatures) @ self.residue.T)
+        by_films = (self.losses.at(nodes)[..., np.newaxis, :] @ self.shares)[..., 0, :]
+        return np.asarray(by_films + (nodes - self.losses.temperatures) @ self.residue.T)
 
     def heat_slopes(self, nodes: Array) -> Array:
         """dQ/dT (..., 4, 4) [W/K]."""
-        return np.asarray(np.einsum("tn,...tm->...nm", self.shares, self.losses.slopes(nodes)) + self.residue)
+        return np.asarray(np.einsum("...tn,...tm->...nm", self.shares, self.losses.slopes(nodes)) + self.residue)
 
     def excess(self, nodes: Array) -> Array:
         """Heat less what the network carries off (..., 4) [W]: zero where the heat balances."""
-        return np.asarray(self.heat(nodes) + source(self.conductances, self.boundaries) - nodes @ self.matrix.T)
+        carried = (self.matrix @ nodes[..., np.newaxis])[..., 0]
+        return np.asarray(self.heat(nodes) + source(self.conductances, self.boundaries) - carried)
 
     def rise(self, nodes: Array) -> float:
         """Largest rise of a node by the heat at temperatures (4,) [C], [K]."""
@@ -126,24 +129,26 @@ class HeatModel(NamedTuple):
         return self._replace(residue=self.matrix @ slopes - viscous)
 
     def balanced(self) -> Array:
-        """Temperatures (4,) [C] that balance their heat, between the coldest surroundings and HOTTEST."""
-        matrix, inflow, coldest = self.matrix, source(self.conductances, self.boundaries), self.coldest
+        """Temperatures (..., 4) [C] that balance their heat, between the coldest surroundings and HOTTEST."""
+        matrix, coldest = self.matrix, self.coldest[..., np.newaxis]
         nodes = np.clip(self.losses.temperatures, coldest, HOTTEST)
         for _ in range(MOST_STEPS):
-            step = np.linalg.solve(matrix - self.heat_slopes(nodes), self.heat(nodes) + inflow - matrix @ nodes)
-            step *= min(1.0, LONGEST_STEP / max(float(np.abs(step).max()), LAST_STEP))
+            step = solved(matrix - self.heat_slopes(nodes), self.excess(nodes))
+            longest = np.abs(step).max(axis=-1, keepdims=True)
+            step *= np.minimum(1.0, LONGEST_STEP / np.maximum(longest, LAST_STEP))
             before, nodes = nodes, np.clip(nodes + step, coldest, HOTTEST)
             if np.abs(nodes - before).max() < LAST_STEP:
                 break
         return np.asarray(nodes)
 
-    def is_stable(self, nodes: Array, most: float = 1.0) -> bool:
-        """Whether the temperatures (4,) of ``balanced`` are a balance of the model below HOTTEST, with a gain below ``most``."""
-        image = np.linalg.solve(self.matrix, self.excess(nodes))
-        return bool(np.abs(image).max() < CLOSED and nodes.max() < HOTTEST and gain(self.image_slopes(nodes)) < most)
+    def is_stable(self, nodes: Array, most: float = 1.0) -> Mask:
+        """Whether the temperatures (..., 4) of ``balanced`` are a balance of the model below HOTTEST, with a gain below ``most``."""
+        image = solved(self.matrix, self.excess(nodes))
+        balance = (np.abs(image).max(axis=-1) < CLOSED) & (nodes.max(axis=-1) < HOTTEST)
+        return np.asarray(balance & (gains(self.image_slopes(nodes)) < most))
 
-    def varied(self, ratios: Mapping[str, float], powers: Array, shares: Array) -> Self:
-        """The model with conductances and ``powers`` (terms,) times ratios, and other ``shares``."""
+    def varied(self, ratios: Mapping[str, Array], powers: Array, shares: Array) -> Self:
+        """Models with conductances (n,) and ``powers`` (n, terms) times ratios, and other ``shares`` (n, terms, 4)."""
         scaled = {name: ratio * getattr(self.conductances, name) for name, ratio in ratios.items()}
         losses = self.losses._replace(powers=powers * self.losses.powers)
         return self._replace(losses=losses, shares=shares, conductances=self.conductances._replace(**scaled))
@@ -151,7 +156,17 @@ class HeatModel(NamedTuple):
 
 def gain(slopes: Array) -> float:
     """Gain of the loop: largest real part of the eigenvalues of dM/dT; steady below one."""
-    return float(np.linalg.eigvals(slopes).real.max())
+    return float(gains(slopes))
+
+
+def gains(slopes: Array) -> Array:
+    """Gains (...) of many loops, of slopes (..., 4, 4)."""
+    return np.asarray(np.linalg.eigvals(slopes).real.max(axis=-1))
+
+
+def solved(matrices: Array, right: Array) -> Array:
+    """Solutions (..., 4) of systems (..., 4, 4) with right sides (..., 4)."""
+    return np.asarray(np.linalg.solve(matrices, right[..., np.newaxis])[..., 0])
 
 
 def no_residue() -> Array:

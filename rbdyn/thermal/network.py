@@ -170,22 +170,22 @@ OIL, OUTER, INNER, ROLLERS = range(len(NODES))
 
 
 class Conductances(NamedTuple):
-    """Conductances of the network [W/K], none negative.
+    """Conductances of the network [W/K], none negative; arrays (...) where they are those of many networks.
 
     ``flow``: heat capacity of the oil stream through the cavity. ``oil_outer``, ``oil_inner``, ``oil_rollers``: surfaces to the oil.
     ``outer_rollers``, ``inner_rollers``: race contacts. ``outer_ambient``, ``inner_ambient``: through housing and shaft.
     ``sump``: from the oil of a bath through the walls of the housing, not through the seat.
     """
 
-    flow: float
-    oil_outer: float
-    oil_inner: float
-    oil_rollers: float
-    outer_rollers: float
-    inner_rollers: float
-    outer_ambient: float
-    inner_ambient: float
-    sump: float = 0.0
+    flow: Any
+    oil_outer: Any
+    oil_inner: Any
+    oil_rollers: Any
+    outer_rollers: Any
+    inner_rollers: Any
+    outer_ambient: Any
+    inner_ambient: Any
+    sump: Any = 0.0
 
 
 class Boundaries(NamedTuple):
@@ -196,13 +196,13 @@ class Boundaries(NamedTuple):
 
 
 def matrix(conductances: Conductances) -> Array:
-    """G [W/K], (4, 4): symmetric, and positive definite where each node has a way out."""
+    """G [W/K], (..., 4, 4): symmetric, and positive definite where each node has a way out."""
     couplings, ways_out, _ = _parts(conductances, Boundaries(0.0, 0.0))
-    return np.diag(ways_out + couplings.sum(axis=1)) - couplings
+    return np.asarray((ways_out + couplings.sum(axis=-1))[..., np.newaxis] * np.eye(len(NODES)) - couplings)
 
 
 def source(conductances: Conductances, boundaries: Boundaries) -> Array:
-    """b [W], (4,): what inlet and surroundings would bring in if all nodes were at 0 C."""
+    """b [W], (..., 4): what inlet and surroundings would bring in if all nodes were at 0 C."""
     return _parts(conductances, boundaries)[2]
 
 
@@ -248,14 +248,15 @@ def carried_off(conductances: Conductances, boundaries: Boundaries, temperatures
 
 
 def _parts(conductances: Conductances, boundaries: Boundaries) -> tuple[Array, Array, Array]:
-    """Couplings between nodes (4, 4), with a zero diagonal; ways out of each node (4,) [W/K]; source (4,) [W]."""
-    for name, value in conductances._asdict().items():
-        if not 0.0 <= value < np.inf:
-            raise MethodError(
-                f"conductance {name} = {value:g} W/K: must be zero or positive and finite; check its sizes"
-            )
-    g = conductances
-    couplings = np.zeros((len(NODES), len(NODES)))
+    """Couplings between nodes (..., 4, 4), with a zero diagonal; ways out of each node (..., 4) [W/K]; source (..., 4) [W]."""
+    for name, values in conductances._asdict().items():
+        for value in np.ravel(values).tolist():
+            if not 0.0 <= value < np.inf:
+                raise MethodError(
+                    f"conductance {name} = {value:g} W/K: must be zero or positive and finite; check its sizes"
+                )
+    g = Conductances(*np.broadcast_arrays(*conductances))
+    couplings = np.zeros((*g.flow.shape, len(NODES), len(NODES)))
     pairs = {
         (OIL, OUTER): g.oil_outer,
         (OIL, INNER): g.oil_inner,
@@ -264,8 +265,8 @@ def _parts(conductances: Conductances, boundaries: Boundaries) -> tuple[Array, A
         (INNER, ROLLERS): g.inner_rollers,
     }
     for (first, second), value in pairs.items():
-        couplings[first, second] = couplings[second, first] = value
-    ways_out = np.array([g.flow + g.sump, g.outer_ambient, g.inner_ambient, 0.0])
+        couplings[..., first, second] = couplings[..., second, first] = value
+    ways_out = np.stack([g.flow + g.sump, g.outer_ambient, g.inner_ambient, 0.0 * g.flow], axis=-1)
     inflow = boundaries.ambient * ways_out
-    inflow[OIL] += g.flow * (boundaries.inlet - boundaries.ambient)
+    inflow[..., OIL] += g.flow * (boundaries.inlet - boundaries.ambient)
     return couplings, ways_out, inflow

@@ -212,6 +212,24 @@ def test_unit_the_model_of_viscous_heat_has_one_solution(ambient, cold):
     assert lumped.balanced() == pytest.approx(np.full(4, low), abs=1e-3)
 
 
+def test_unit_many_models_balance_as_each_alone():
+    """Unit: models about one state with their own conductances, powers and shares balance at once where each does alone, also those
+    that run away, and have its verdict."""
+    draw = np.random.default_rng(3)
+    model = _model(np.full(4, 60.0), HEAT, 0.7).with_image_slopes(np.diag([0.3, 0.1, 0.2, 0.4]))
+    flow, powers = 10.0 ** draw.uniform(-1.0, 0.5, 64), draw.uniform(0.1, 1.0, (64, 4))
+    shares = draw.dirichlet(np.full(4, 0.3), (64, 4))
+    many = model.varied({"flow": flow, "outer_ambient": flow}, powers, shares)
+    nodes = many.balanced()
+    stable = many.is_stable(nodes)
+    assert 5 < stable.sum() < 60
+    for place in range(len(flow)):
+        each = model.varied({"flow": flow[place], "outer_ambient": flow[place]}, powers[place], shares[place])
+        alone = each.balanced()
+        assert nodes[place] == pytest.approx(alone, abs=1e-7) and stable[place] == each.is_stable(alone)
+        assert many.coldest[place] == each.coldest
+
+
 def test_unit_slopes_of_the_model():
     """Unit: slopes of the heat are its differences, and the rest makes those of the image what they are told to be."""
     model = _model(np.full(4, 60.0), HEAT, 0.7)
