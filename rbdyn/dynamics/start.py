@@ -50,7 +50,7 @@ from rbdyn.result import (
     StartResult,
 )
 from rbdyn.scene import Scene, input_ranges
-from rbdyn.scene.thermal import PART_KEYS, Temperatures, at_temperatures, ceilings, point_before
+from rbdyn.scene.thermal import Temperatures, at_temperatures, ceilings, point_before
 from rbdyn.thermal import start as warming
 from rbdyn.thermal.fixed_point import State
 from rbdyn.thermal.losses import HOTTEST
@@ -420,8 +420,7 @@ def _ranges(machine: Machine, law: warming.Law, path: Path, simulated: Sequence[
     varied = list(input_ranges.varied_inputs(machine.thermal, sets, levels))
     many = input_ranges.law_of_sets(law, [each.around for each in simulated], varied, partial(term_shares, hot))
     rows = _course_of(machine, many, np.array([capacities(hot, thermal) for thermal, *_ in varied]), ROUGH)
-    keys = {name: np.array([getattr(each, name) for each, *_ in varied]) for name in PART_KEYS}
-    plays, left = machine.clearances(rows, machine.thermal.model_copy(update=keys))
+    plays, left = machine.clearances(rows, input_ranges.together([thermal for thermal, *_ in varied]))
     figures = _with_lead(rows, plays, len(rows.times))
     seizing = np.any([(play <= 0.0).any(axis=0) for play in left.values()], axis=0)
     seizing = seizing | (rows.temperatures.max(axis=(0, 2)) > HOTTEST)

@@ -34,17 +34,9 @@ from rbdyn.dynamics.statistics.metrics import quantity, work_done
 from rbdyn.dynamics.statistics.replicate import Replicate, Statistic, mean
 from rbdyn.result import HeatBalance, Quantity, Ranges, SimulationResult
 from rbdyn.scene import Scene
-from rbdyn.scene.input_ranges import input_ranges
+from rbdyn.scene.input_ranges import input_ranges, together
 from rbdyn.scene.notes import heat_notes
-from rbdyn.scene.thermal import (
-    PART_KEYS,
-    Temperatures,
-    Thermal,
-    at_temperatures,
-    inlet_temperature,
-    part_temperatures,
-    too_hot,
-)
+from rbdyn.scene.thermal import Temperatures, Thermal, at_temperatures, inlet_temperature, part_temperatures, too_hot
 from rbdyn.thermal.fixed_point import CLEAR, TOLERANCE, VAGUE, State, learned, model_of, next_step, steady_state
 from rbdyn.thermal.losses import HOTTEST, HeatModel, gain, log_viscosity, no_residue
 from rbdyn.thermal.network import NODES, carried_off
@@ -420,7 +412,7 @@ def _result(
     thermal = HeatBalance(
         status=status,
         reason=reason or None,
-        gain=gain(slopes),
+        gain=float(gain(slopes)),
         slopes=slopes.tolist() if steady else None,
         heat_W=dict(zip(NODES, of_nodes.tolist(), strict=True)),
         windage_W=network.windage,
@@ -460,8 +452,7 @@ def _ranges(scene: Scene, hot: Scene, path: Sequence[State], slopes: Array) -> R
     assert mounting is not None
 
     def clearances(nodes: Array, thermals: Sequence[Thermal]) -> dict[str, Array]:
-        keys = {name: np.array([getattr(each, name) for each in thermals]) for name in PART_KEYS}
-        parts = part_temperatures(thermals[0].model_copy(update=keys), Temperatures(*nodes.T))
+        parts = part_temperatures(together(thermals), Temperatures(*nodes.T))
         plays = hot.clearances_of(mounting.model_copy(update=parts))
         return {f"{name}_um": 1e6 * play + np.zeros(len(nodes)) for name, play in plays.items()}
 

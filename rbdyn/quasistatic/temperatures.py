@@ -407,7 +407,7 @@ def _record(scene: SingleRowScene, search: Search, ranges: Ranges, status: str, 
     sizes = {"drawn": clearance_of(drawn.row), "operating": clearance_of(found.model.row)}
     return BallHeatBalance(
         status=status,
-        gain=gain(search.slopes),
+        gain=float(gain(search.slopes)),
         heat_W=dict(zip(NODES, found.heat.tolist(), strict=True)),
         clearance_um={name: 1e6 * clearance for name, (clearance, _) in sizes.items()},
         unloaded_angle_deg={name: math.degrees(angle) for name, (_, angle) in sizes.items()},

@@ -167,6 +167,12 @@ def varied_inputs(thermal: "Thermal", sets: Mapping[str, Array], levels: Levels)
         yield thermal.model_copy(update=update), ratios, level
 
 
+def together(thermals: "Sequence[Thermal]") -> "Thermal":
+    """[thermal] of many machines: the keys by which parts follow the nodes are arrays (n,), all others are from the first."""
+    keys = ("shaft_lag", "cage_offset_K")
+    return thermals[0].model_copy(update={key: np.array([getattr(each, key) for each in thermals]) for key in keys})
+
+
 def input_sets(
     scene: "Scene | SingleRowScene",
     levels: Collection[str],

@@ -403,10 +403,6 @@ def _cold_films(mounting: Mounting) -> Iterator[str]:
         )
 
 
-# Keys that set temperatures of parts by those of the nodes.
-PART_KEYS = ("shaft_lag", "cage_offset_K")
-
-
 def part_temperatures(
     thermal: Thermal, temperatures: Temperatures, cage: bool = True, seats: tuple[Any, Any] | None = None
 ) -> dict[str, Any]:

@@ -7,7 +7,7 @@ is concave there. Whatever else moves heat, such as lost clearance, is ``residue
 """
 
 from collections.abc import Callable, Mapping
-from typing import Literal, NamedTuple, Self
+from typing import Any, Literal, NamedTuple, Self
 
 import numpy as np
 
@@ -145,7 +145,7 @@ class HeatModel(NamedTuple):
         """Whether the temperatures (..., 4) of ``balanced`` are a balance of the model below HOTTEST, with a gain below ``most``."""
         image = solved(self.matrix, self.excess(nodes))
         balance = (np.abs(image).max(axis=-1) < CLOSED) & (nodes.max(axis=-1) < HOTTEST)
-        return np.asarray(balance & (gains(self.image_slopes(nodes)) < most))
+        return np.asarray(balance & (gain(self.image_slopes(nodes)) < most))
 
     def varied(self, ratios: Mapping[str, Array], powers: Array, shares: Array) -> Self:
         """Models with conductances (n,) and ``powers`` (n, terms) times ratios, and other ``shares`` (n, terms, 4)."""
@@ -154,14 +154,9 @@ class HeatModel(NamedTuple):
         return self._replace(losses=losses, shares=shares, conductances=self.conductances._replace(**scaled))
 
 
-def gain(slopes: Array) -> float:
-    """Gain of the loop: largest real part of the eigenvalues of dM/dT; steady below one."""
-    return float(gains(slopes))
-
-
-def gains(slopes: Array) -> Array:
-    """Gains (...) of many loops, of slopes (..., 4, 4)."""
-    return np.asarray(np.linalg.eigvals(slopes).real.max(axis=-1))
+def gain(slopes: Array) -> Any:
+    """Gain of the loop (...): largest real part of the eigenvalues of dM/dT (..., 4, 4); steady below one."""
+    return np.linalg.eigvals(slopes).real.max(axis=-1)
 
 
 def solved(matrices: Array, right: Array) -> Array:

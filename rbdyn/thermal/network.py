@@ -170,7 +170,7 @@ OIL, OUTER, INNER, ROLLERS = range(len(NODES))
 
 
 class Conductances(NamedTuple):
-    """Conductances of the network [W/K], none negative; arrays (...) where they are those of many networks.
+    """Conductances of the network [W/K], none negative; arrays (...) for many networks.
 
     ``flow``: heat capacity of the oil stream through the cavity. ``oil_outer``, ``oil_inner``, ``oil_rollers``: surfaces to the oil.
     ``outer_rollers``, ``inner_rollers``: race contacts. ``outer_ambient``, ``inner_ambient``: through housing and shaft.
