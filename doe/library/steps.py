@@ -65,24 +65,22 @@ def design(path: Path | str, out: Path | str | None = None, force: bool = False)
     Raises InputError with all faults of the study.
     """
     from doe.report.sections.design import design_sheet
+    from doe.workflow import problem, region, status, whole
     from doe.workflow.design import DesignResult
-    from doe.workflow.problem import Problem
-    from doe.workflow.region import region_that_runs
-    from doe.workflow.status import study_identity
-    from doe.workflow.whole import check_study
 
     path, folder = path_given(path, "path"), optional_path(out, "out")
     with step_folder(folder, "design", ("design",), force) as output:
-        study = Problem.load(path)
+        study = problem.Problem.load(path)
         # Without a scene the runs are made elsewhere, and only the design itself is checked.
         notes: Notes = ()
         if study.file.scene and study.path_of(study.scene.file).exists():
             with Effort().folder(folder) as store:
-                study, notes = region_that_runs(study, store, Effort())
-            check_study(study)
+                study, notes = region.region_that_runs(study, store, Effort())
+            whole.check_study(study)
         output.claim(path)
         result = DesignResult.of(study, study.design, notes)
-        answer = DesignAnswer(result.as_dict(), folder, identity=study_identity("doe design", study), result=result)
+        identity = status.study_identity("doe design", study)
+        answer = DesignAnswer(result.as_dict(), folder, identity=identity, result=result)
         sheet = design_sheet(study.factors, result.runs)
         return replace(answer, files=saved(output, "design.json", answer, lambda: {sheet.file: sheet.records}))
 

@@ -244,22 +244,21 @@ def study(
 
 def _part(path: Path, target: Path, share: tuple[int, int], effort: Effort, force: bool) -> PartAnswer:
     """The design runs of a part. Raises as ``study``."""
-    from doe.running.runner import part_folder, refuse_other_parts
-    from doe.running.store import Failure
-    from doe.workflow.problem import Problem
-    from doe.workflow.status import inputs_digest
-    from doe.workflow.whole import run_part
+    from doe.running import runner, store
+    from doe.workflow import problem, status, whole
 
-    folder = part_folder(target, share)
+    folder = runner.part_folder(target, share)
     with output_folder(folder, "doe", (), force=force) as output, registered(path, folder):
-        loaded = Problem.load(path)
-        digest = inputs_digest(loaded)
-        refuse_other_parts(target, digest)
+        loaded = problem.Problem.load(path)
+        digest = status.inputs_digest(loaded)
+        runner.refuse_other_parts(target, digest)
         output.claim(path)
         with effort.agenda(folder, "doe study", inputs=digest) as agenda:
-            results = run_part(loaded, folder, effort, share, agenda)
+            results = whole.run_part(loaded, folder, effort, share, agenda)
             agenda.finish([])
-    failures = [{"label": result.label, "cause": result.cause} for result in results if isinstance(result, Failure)]
+    failures = [
+        {"label": result.label, "cause": result.cause} for result in results if isinstance(result, store.Failure)
+    ]
     record = {"status": "failed" if failures else "ok", "part": list(share), "runs": len(results), "failures": failures}
     return PartAnswer(record, folder, (), words=f"part {share[0]} of {share[1]}")
 
