@@ -7,7 +7,6 @@ import re
 import tempfile
 import tomllib
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
@@ -16,19 +15,13 @@ import typer
 from rbdyn.base import command
 from rbdyn.base.faults import InputError, MethodError
 from rbdyn.base.tables.sheet import listed
-from rbdyn.base.words import counted
 from rbdyn.clearances import CLEARANCES
 
 if TYPE_CHECKING:
-    from doe.duty import Run, Simulated
-    from doe.running.store import Failure
-    from doe.workflow.effort import Effort
     from doe.workflow.parts import ClearanceParts, Manufacture
     from doe.workflow.problem import Problem
-    from rbdyn.result import Quantity
     from rbdyn.scene import Scene
     from rbdyn.scene.duty import DutyPoint
-    from rbdyn.verdict.orbits import CageVerdict
 
 
 RESOLUTION_MM, SMALLEST_STEP_MM = 0.001, 0.002
@@ -48,18 +41,8 @@ HINT = """# Add to a factor: tolerance = 0.005, the half width that can be manuf
 # [tolerances] count with it. A response may have limits: upper = 100.0. Chains of dimensions: [[chain]]."""
 LIMIT = re.compile(r"\s*([^<>=\s]+)\s*(<=|>=|=)\s*([^<>=]+?)\s*")
 CAGE_CLASS = "cage.verdict"
-WHIRL, IMPACT_POWER = "whirl_deviation_ratio", "pocket_impact_power_W"
 # Tolerance of design runs with elastic contacts: 13 to 22 % fewer right-hand sides than the default, and no bias that shows.
 DESIGN_RTOL = 0.04
-# Turns that design runs discard, and those that they discard where a bearing forgets its start as fast as most do.
-DISCARDED, FEWER = 20, 7
-# Settings of short runs of the baseline beside those of the study's runs: of one as it is, whose replicates are as few as name a
-# class of the cage, and of one that counts the turns between. Impacts have windows that fit both.
-SHORT_RUN = ("numerics.extend=false", "numerics.impact_window_turns=4")
-BETWEEN = (*SHORT_RUN, f"numerics.discard_turns={FEWER}", f"numerics.turns={(DISCARDED - FEWER) // 4 * 4}")
-# Largest bias by fewer turns, over the error of six replicates: half of the error of the four of a design run; and over the figure,
-# up to which it decides nothing.
-SLIGHT_BIAS, NEGLIGIBLE_BIAS = 0.75, 1e-3
 HELD = """# Cage: held in a short run of the scene, so its whirl ratio means little and the impact power is a goal instead.
 # You can still name the whirl ratio: [[response]] with name = "whirl_deviation_ratio" and goal = "min".
 """
@@ -120,7 +103,8 @@ def new(
     """Create a commented study file for the clearances of a scene file."""
     with command.guarded(as_json):
         from doe.study_file.study import StudyFile
-        from doe.workflow import front, problem, region, whole
+        from doe.workflow import front, problem, region, short_runs, whole
+        from doe.workflow.confirmation import WHIRL
         from doe.workflow.effort import Effort
         from rbdyn.base.faults import read_toml, validated
         from rbdyn.scene import DrawnScene, rollers_only
@@ -133,7 +117,7 @@ def new(
         factors = _factors(read_toml(path))
         values = {"quoted": _quoted_path(path, out), "hours": "true" if hours else None}
 
-        def written(factors: list[Factor], discarded: int = DISCARDED) -> tuple[str, problem.Problem]:
+        def written(factors: list[Factor], discarded: int = short_runs.DISCARDED) -> tuple[str, problem.Problem]:
             parts = _sections(scene, factors, tolerances, chains)
             text = _filled(parts | sections, values | _numerics(scene, discarded))
             file = validated(StudyFile, tomllib.loads(text), f"study of {path}")
@@ -147,13 +131,13 @@ def new(
             if moved is not study:
                 sections["baseline"], factors = _baseline(moved), _moved(factors, study, moved)
                 text, study = written(factors)
-            cages = baseline_cages(study, folder, effort)
+            cages = short_runs.baseline_cages(study, folder, effort)
             if {cage.name for cage in cages.values()} == {"held"}:
-                sections["responses"] = HELD + _responses(limits, {WHIRL: IMPACT_POWER}) + class_limit
+                sections["responses"] = HELD + _responses(limits, {WHIRL: short_runs.IMPACT_POWER}) + class_limit
                 text, study = written(factors)
-            if cages and len(slow := slow_points(study, folder, effort)) < len(cages):
+            if cages and len(slow := short_runs.slow_points(study, folder, effort)) < len(cages):
                 sections["duty"] = duty_text(points, hours, slow)
-                text, study = written(factors, FEWER)
+                text, study = written(factors, short_runs.FEWER)
         whole.check_study(study)
         command.hand_out(text, as_json, out, force, "doe study", reads)
 
@@ -168,104 +152,12 @@ def _numerics(scene: "Scene", discarded: int) -> dict[str, str | None]:
 
     That is looser unless the scene has its own or may run implicitly. Confirmations keep the default of both.
     """
+    from doe.workflow.short_runs import DISCARDED
+
     looser, kept = "", [f"numerics.discard_turns={DISCARDED}"] * (discarded != DISCARDED)
     if scene.traction.elasticity and "rtol" not in scene.numerics.model_fields_set:
         looser, kept = f', "numerics.rtol={DESIGN_RTOL}"', [f"numerics.rtol={scene.numerics.rtol}", *kept]
     return {"discarded": str(discarded), "looser": looser, "kept": json.dumps(kept) if kept else None}
-
-
-def baseline_cages(study: "Problem", folder: Path, effort: "Effort") -> "dict[str, CageVerdict]":
-    """Class of the cage at the baseline by point of the duty, by a short run; empty where none traces it, or the run fails.
-
-    Raises InputError before it for a study that cannot run.
-    """
-    from doe.duty import cages_of, scenes_of
-    from doe.running.store import Failure
-    from doe.workflow.whole import check_study
-    from rbdyn.dynamics.figures import why_missing
-
-    check_study(study)
-    run = _short_run(study, SHORT_RUN)
-    if any(scene.cage_sample_s is None or why_missing(scene, IMPACT_POWER) for scene in scenes_of(run)):
-        return {}
-    (result,) = _baseline_results(study, [run], "the class of the cage", folder, effort)
-    return {} if isinstance(result, Failure) else cages_of(result)
-
-
-def slow_points(study: "Problem", folder: Path, effort: "Effort") -> list[str]:
-    """Points of the duty, or OPERATION, where fewer discarded turns bias a response with a goal, by short runs of the baseline.
-
-    They are all points where a run fails. A heat balance is made once: the turns between are at its temperatures.
-    """
-    from doe.duty import OPERATION, main_scene
-    from doe.running.store import Failure
-
-    (usual,) = _baseline_results(study, [_short_run(study, SHORT_RUN)], "", folder, effort)
-    if not isinstance(usual, Failure):
-        between = _at_temperatures_of(usual, _short_run(study, BETWEEN, more=2))
-        (early,) = _baseline_results(study, [between], "the turns to discard", folder, effort)
-        if not isinstance(early, Failure):
-            names, sooner = [study.responses[place] for place in study.goals.objectives], _figures_at(early)
-            turns = main_scene(study.usual_run).numerics.turns
-            return [
-                point
-                for point, figures in _figures_at(usual).items()
-                if any(_biased(figures[name], sooner[point][name], turns) for name in names)
-            ]
-    return [*study.shares] or [OPERATION]
-
-
-def _biased(figure: "Quantity", early: "Quantity", turns: float) -> bool:
-    """Whether a run that counts the ``early`` figure too, of so many turns, is biased by much of its error."""
-    bias = (DISCARDED - FEWER) / turns * abs(early.value - figure.value)
-    return bias > max(SLIGHT_BIAS * (figure.statistical_error or 0.0), NEGLIGIBLE_BIAS * abs(figure.value))
-
-
-def _figures_at(result: "Simulated") -> "Mapping[str, Mapping[str, Quantity]]":
-    """Figures by point of the duty, or under OPERATION."""
-    from doe.duty import OPERATION, DutyResult
-
-    return result.at_points if isinstance(result, DutyResult) else {OPERATION: result.responses}
-
-
-def _at_temperatures_of(result: "Simulated", run: "Run") -> "Run":
-    """The run at the temperatures that the heat balances of a result have."""
-    from doe.duty import OPERATION, DutyResult, DutyScenes, scene_at
-    from rbdyn.scene.thermal import Temperatures, at_temperatures
-
-    results = result.points if isinstance(result, DutyResult) else {OPERATION: result}
-    hot = {
-        name: at_temperatures(scene_at(run, name), Temperatures(**{node: it.value for node, it in nodes.items()}))
-        for name, found in results.items()
-        if (nodes := found.temperatures_C) is not None
-    }
-    return replace(run, scenes={**run.scenes, **hot}) if isinstance(run, DutyScenes) else hot.get(OPERATION, run)
-
-
-def _short_run(study: "Problem", settings: Sequence[str], more: int = 1) -> "Run":
-    """A run of the baseline with as few replicates as name a class of the cage, or ``more`` times as many."""
-
-    def scene(sets: Sequence[str]) -> "Scene":
-        bare = study.scene_at(study.baseline, study.file.design.seed, sets, confirms=True)
-        effort = [f"numerics.replicates={more * bare.verdict.limits.fewest_replicates}", *settings]
-        return study.scene_at(study.baseline, study.file.design.seed, [*sets, *effort], confirms=True)
-
-    return study.over_duty(scene)
-
-
-def _baseline_results(
-    study: "Problem", runs: "Sequence[Run]", purpose: str, folder: Path, effort: "Effort"
-) -> "list[Simulated | Failure]":
-    """Results of short runs of the baseline; the notice hears of their ``purpose``, if they have one."""
-    from doe.duty import scenes_of
-
-    if effort.notice is not None and purpose:
-        scenes = scenes_of(runs[-1])
-        numerics = scenes[0].numerics
-        turns = numerics.replicates * (numerics.turns + numerics.warm_up_turns)
-        effort.notice(f"{counted(len(scenes), 'short run')} of {turns:g} shaft turns for {purpose}")
-    with effort.simulations(folder, study.path) as simulations:
-        return simulations.run(runs, ["baseline"] * len(runs), simulations.progress("baseline"))
 
 
 def limits_of(texts: Sequence[str]) -> Limits:
@@ -398,6 +290,8 @@ def _quoted(value: str | list[str]) -> str:
 
 def duty_text(points: "Sequence[DutyPoint]", hours: bool, slow: Sequence[str] = ()) -> str:
     """The [[duty]] tables of a study; ``hours``: whether shares are hours; ``slow``: points that discard more turns than the others."""
+    from doe.workflow.short_runs import DISCARDED
+
     unit, more = "h" if hours else "of the time", [f"numerics.discard_turns={DISCARDED}"]
     return "\n".join(
         POINT.format(

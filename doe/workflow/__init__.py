@@ -12,6 +12,7 @@
   them, with ``judgement`` as its record; ``duty``: the answer at every point of a duty
 - ``rig``: measurements; ``calibration``: inputs from them, with ``identification`` as its record
 - ``scene_table``: tables of scenes, and the runs of their rows
+- ``short_runs``: of a baseline before its study is written: the class of its cage, the turns to discard
 - ``status``: stages, identity and status of a command; ``effort``: threads or a cluster; ``whole``: the study, or a part of
   it for a job of a queue
 """
