@@ -11,8 +11,11 @@ import numpy as np
 
 from rbdyn.properties.materials import Oil
 
-# Least numerator of the thermal factor, whose fit passes zero for cold oil at high speed.
-SMALLEST_PRESSURE_TERM = 0.1
+# Exponent of viscosity in films: 0.67 of points to 0.69 of lines. The fit of the thermal factor ends where it falls as steeply: beyond,
+# a thicker oil would have the thinner film, and the numerator passes zero for cold oil at high speed.
+FALL = 0.67
+# Steps that halve an interval of 40 down to round-off.
+HALVINGS = 60
 # End of the starvation fit, from which the inlet counts as flooded.
 FLOODED = 8.0
 
@@ -60,7 +63,7 @@ def thermal_factor(contact: RollingContact, oil: Oil, load: Any, slip: Any = 0.0
     """Reduction of the film by shear heating of the inlet, at a slip [m/s] (Gupta, Cheng and Zhu 1992).
 
     (1 - 13.2 (p_H/E') L^0.42)/(1 + 0.213 (1 + 2.23 S^0.83) L^0.64), L = (-d eta/dT) u^2/k, S = slip/u. Zhou and Hoeprich 1991,
-    eq 21, print the same constants. The numerator is at least 0.1, the end of the fit.
+    eq 21, print the same constants. Beyond the L where it falls with L^-0.67 it goes on so, and films keep their thickness.
     """
     pressure = hertz_pressure(contact, load) / contact.equivalent_modulus
     return inlet_heating(pressure, oil, contact.entrainment_speed, slip)
@@ -69,9 +72,34 @@ def thermal_factor(contact: RollingContact, oil: Oil, load: Any, slip: Any = 0.0
 def inlet_heating(relative_pressure: Any, oil: Oil, entrainment_speed: Any, slip: Any = 0.0) -> Any:
     """The thermal factor at a Hertz pressure p_H/E', for line and point contacts."""
     heating = oil.viscosity_slope * entrainment_speed**2 / oil.conductivity
-    numerator = np.maximum(1.0 - 13.2 * relative_pressure * heating**0.42, SMALLEST_PRESSURE_TERM)
     slide_roll = np.abs(slip) / entrainment_speed
-    return numerator / (1.0 + 0.213 * (1.0 + 2.23 * slide_roll**0.83) * heating**0.64)
+    weights = 13.2 * relative_pressure, 0.213 * (1.0 + 2.23 * slide_roll**0.83)
+    if np.all(_thermal_fall(heating, *weights) <= FALL):
+        return _thermal_fit(heating, *weights)
+    # The steepness grows with L, so halving the interval of its logarithm finds the end to round-off.
+    low, high = np.zeros(np.broadcast(heating, *weights).shape), np.log1p(heating)
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        steep = _thermal_fall(np.expm1(middle), *weights) > FALL
+        low, high = np.where(steep, low, middle), np.where(steep, middle, high)
+    end = np.expm1(low)
+    return np.where(
+        _thermal_fall(heating, *weights) > FALL,
+        _thermal_fit(end, *weights) * (end / heating) ** FALL,
+        _thermal_fit(heating, *weights),
+    )
+
+
+def _thermal_fit(heating: Any, pressure: Any, slip: Any) -> Any:
+    return (1.0 - pressure * heating**0.42) / (1.0 + slip * heating**0.64)
+
+
+def _thermal_fall(heating: Any, pressure: Any, slip: Any) -> Any:
+    """-d ln(factor)/d ln(L) of the fit, infinite where the factor is not positive."""
+    above, below = pressure * heating**0.42, slip * heating**0.64
+    # A numerator of zero or less has no logarithm.
+    left = np.maximum(1.0 - above, 1e-9)
+    return 0.42 * above / left + 0.64 * below / (1.0 + below)
 
 
 def starvation_factor(contact: RollingContact, load: Any, film: Any, inlet_distance: float) -> Any:

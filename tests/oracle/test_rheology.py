@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -152,6 +153,22 @@ def test_unit_film_groups():
     assert films.half_width(INNER, 100.0) == pytest.approx(0.5 * films.half_width(INNER, 400.0), rel=1e-12)
     mean = 500.0 / (2.0 * films.half_width(INNER, 500.0) * INNER.length)
     assert films.hertz_pressure(INNER, 500.0) == pytest.approx(4.0 / math.pi * mean, rel=1e-12)
+
+
+def test_colder_oil_has_no_thinner_film():
+    """Limit: with viscosity and its slope alone, films grow until inlet heating holds them; the fit alone let them fall by ten."""
+    oil = oil_at("MIL-L-23699", 20.0)
+    thicker = np.logspace(-3.0, 5.0, 60)
+    for speed in (3.0, 10.0, 30.0):
+        contact = INNER._replace(entrainment_speed=speed)
+        films_m = [
+            films.film_in_service(
+                contact, replace(oil, viscosity=k * oil.viscosity, viscosity_slope=k * oil.viscosity_slope), 8000.0
+            )
+            for k in thicker
+        ]
+        slopes = np.diff(np.log(films_m)) / np.diff(np.log(thicker))
+        assert np.all(slopes > 0.0) and slopes[-1] == pytest.approx(0.69 - 0.67, abs=1e-6)
 
 
 def test_unit_lightest_load_is_where_two_films_meet():
