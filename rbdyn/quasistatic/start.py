@@ -98,15 +98,20 @@ class Machine(NamedTuple):
         def net(time: float, nodes: Array) -> Array:
             # Beyond an impossible bearing the heat stays, so that the integration ends; rows from there on are cut.
             nonlocal last
-            if nodes.max() > HOTTEST:
-                return np.zeros_like(nodes)
-            with suppress(InputError):
-                last = self.at(time, nodes).net(nodes)
-            return last
+            share = _held(nodes)
+            if share:
+                with suppress(InputError):
+                    last = self.at(time, nodes).net(nodes)
+            return last * share
 
         return warming.integrate(
             self.capacities, net, self.cold, self.end, self.course.times.tolist(), tolerance
         ).until_hot()
+
+
+def _held(nodes: Array) -> Array:
+    """Share of the net heat (..., 1) that warms a machine: it ends over ``HELD``, so that what runs away stays there without a step."""
+    return np.clip(1.0 - (nodes.max(axis=-1, keepdims=True) - HOTTEST) / HELD, 0.0, 1.0)
 
 
 class Path(NamedTuple):
@@ -401,12 +406,9 @@ def _many(machine: Machine, law: warming.Law, varied: Sequence[Any]) -> warming.
     start, breaks = np.broadcast_to(machine.cold, parts.shape), machine.course.times.tolist()
     net = law.net_heat(machine.course)
 
-    def held(time: float, nodes: Array) -> Array:
-        # What runs away stays at the temperature that no oil bears.
-        beyond = (nodes.max(axis=-1, keepdims=True) - HOTTEST) / HELD
-        return net(time, nodes) * np.clip(1.0 - beyond, 0.0, 1.0)
-
-    return warming.integrate(parts, held, start, machine.end, breaks, ROUGHEST)
+    return warming.integrate(
+        parts, lambda time, nodes: net(time, nodes) * _held(nodes), start, machine.end, breaks, ROUGHEST
+    )
 
 
 def _clearances_of_sets(machine: Machine, rows: warming.Warming, thermals: Sequence[Thermal]) -> dict[str, Array]:

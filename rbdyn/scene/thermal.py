@@ -408,15 +408,19 @@ def part_temperatures(
 ) -> dict[str, Any]:
     """Keys of [mounting] at temperatures of the nodes [C]; ``cage``: whether the bearing's model has one.
 
-    ``seats``: temperatures of housing and shaft where these do not follow their rings at once.
+    ``seats``: temperatures of housing and shaft where these do not follow their rings at once. A shaft that warms from below
+    ambient does not lag: the ring and the air heat it.
     """
     _, outer, inner, rollers = temperatures
     housing, shaft = (outer, inner) if seats is None else seats
+    rise = shaft - thermal.ambient_C
+    if seats is not None:
+        rise = rise * ((rise >= 0.0) | (inner < shaft))
     parts = {
         "inner_ring_temperature_C": inner,
         "outer_ring_temperature_C": outer,
         "roller_temperature_C": rollers,
-        "shaft_temperature_C": shaft - thermal.shaft_lag * (shaft - thermal.ambient_C),
+        "shaft_temperature_C": shaft - thermal.shaft_lag * rise,
         "housing_temperature_C": housing,
     }
     return parts | ({"cage_temperature_C": rollers + thermal.cage_offset_K} if cage else {})

@@ -1,6 +1,7 @@
 """Start of a cold ball bearing: known answers, an integration of its own, preload, runaway, bad input, nothing when off."""
 
 import json
+import math
 import re
 import subprocess
 import sys
@@ -15,12 +16,12 @@ from rbdyn.base.faults import InputError
 from rbdyn.base.words import shown
 from rbdyn.cli.ball_studies import equilibrium_blocks, write_equilibrium
 from rbdyn.quasistatic.result import BallResult
-from rbdyn.quasistatic.start import at_point, capacities, radial_clearance
+from rbdyn.quasistatic.start import ROUGH, _machine, at_point, capacities, radial_clearance
 from rbdyn.quasistatic.sweep import sweep
 from rbdyn.quasistatic.temperatures import at_temperatures, heat_at, steady_temperatures
 from rbdyn.result import start_sheet
 from rbdyn.scene import Scene
-from rbdyn.scene.thermal import Temperatures
+from rbdyn.scene.thermal import Temperatures, part_temperatures
 from rbdyn.thermal.start import WARMING_NODES
 
 EXAMPLE = ROOT / "examples" / "hot_ball.toml"
@@ -100,6 +101,69 @@ def test_oracle_rows_are_equilibria_at_stated_temperatures(cold):
         assert abs(stated.reaction.load_N["z"]) == pytest.approx(at_row["axial_load_N"], rel=1e-4)
         assert max(stated.max_stress_MPa.values()) == pytest.approx(at_row["contact_pressure_MPa"], rel=1e-4)
         assert float(radial_clearance(hot, scene.thermal, nodes)) == pytest.approx(at_row["radial_um"], abs=1e-3)
+
+
+def test_oracle_machine_as_cold_as_its_start_has_no_gradients():
+    """Oracle: a fit at -20 C in a room of 20 C takes what it takes at 20 C by Lame's formula; the shaft was 5 K warmer than stated."""
+    cold, interference = {"time_s": [0.0, 9.0], "speed_rpm": [0.0, 8000.0], "load_N": [100.0, 500.0]}, 12.0
+    scene = _spindle(
+        {"from_C": -20.0, "schedule": cold},
+        mounting={"inner_interference_um": interference, "rotation": False},
+        operation={"radial_load_N": 500.0},
+    )
+    clearances = [
+        rbdyn.equilibrium(each).start.path.figures["radial_um"][0]
+        for each in (scene, scene.changed({"mounting.inner_interference_um": -50.0}))
+    ]
+    raceway = 54.0 - 7.938 * (1.0 + 2.0 * 0.03 * (1.0 - math.cos(math.radians(15.0))))
+    assert clearances[1] - clearances[0] == pytest.approx(interference * 40.0 / raceway, rel=0.03)
+
+
+def test_shaft_lags_only_where_it_loses_heat_or_cools_the_ring():
+    """Limit: no lag below ambient while the ring warms the shaft; above ambient, or colder than the air with a cooled ring, its share."""
+    thermal = _spindle().thermal
+
+    def lag(inner, shaft):
+        return (
+            shaft
+            - part_temperatures(thermal, Temperatures(0.0, 0.0, inner, 0.0), seats=(0.0, shaft))["shaft_temperature_C"]
+        )
+
+    assert lag(-20.0, -20.0) == lag(5.0, -10.0) == lag(30.0, 20.0) == 0.0
+    assert lag(60.0, 60.0) == pytest.approx(0.125 * 40.0) and lag(-30.0, -20.0) == pytest.approx(-0.125 * 40.0)
+    nodes = np.array([-20.0, 60.0])
+    assert np.allclose(lag(nodes, nodes), [0.0, 5.0])
+
+
+def test_runaway_of_balls_ends_soon():
+    """Unit: a machine that no oil bears ends in few evaluations; the step of its net heat at 350 C held the integration for 300 s."""
+    scene = Scene.from_dict(
+        {
+            "bearing": {
+                "kind": "angular_contact_ball", "balls": 19, "ball_diameter_mm": 11.9062, "pitch_diameter_mm": 90.0,
+                "contact_angle_deg": 40.0, "inner_groove_factor": 0.52, "outer_groove_factor": 0.53,
+            },
+            "lubricant": {"oil": "ISO VG 100", "supply": "grease", "roller_roughness_um": 0.02, "race_roughness_um": 0.1},
+            "mounting": {
+                "bore_mm": 70.0, "outside_diameter_mm": 110.0, "width_mm": 20.0, "housing_diameter_mm": 165.0,
+                "inner_interference_um": 14.25, "outer_interference_um": -12.0,
+            },
+            "thermal": {"ambient_C": 20.0, "start": {"from_C": -20.0}},
+            "operation": {"inner_speed_rpm": 8000.0, "radial_load_N": 2000.0, "preload_N": 4000.0},
+        }
+    )  # fmt: skip
+    machine = _machine(scene, steady_temperatures(scene))
+    calls = 0
+
+    def counted(*arguments):
+        nonlocal calls
+        calls += 1
+        return heat_at(*arguments)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("rbdyn.quasistatic.start.heat_at", counted)
+        rows = machine.warmed(ROUGH)
+    assert rows.is_hot and rows.times[-1] < machine.end and calls < 3000
 
 
 def test_oracle_spacing_and_first_guess_of_balls_do_not_matter(cold, monkeypatch):
