@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Self
 
 import numpy as np
 
-from rbdyn.base.arrays import Array
+from rbdyn.base.arrays import Array, Mask
 from rbdyn.base.blocks import Column, Sheet, columns_of, within
 from rbdyn.base.faults import MethodError
 from rbdyn.base.notes import Note, Notes
@@ -69,6 +69,8 @@ Race = Literal["inner", "outer"]
 RACES: tuple[Race, Race] = ("inner", "outer")
 # Ball load [N] below which a ball counts as unloaded.
 NO_LOAD = 1e-9
+# Share of the largest ball load below which a ball is idle: its angle and its gyroscopic moment do no harm.
+IDLE = 1e-3
 
 
 class Rating(NamedTuple):
@@ -101,6 +103,12 @@ def loads_on(solution: Solution, race: Race) -> Array:
     return solution.inner_load if race == "inner" else solution.outer_load
 
 
+def carrying(solution: Solution, race: Race) -> Mask:
+    """Whether the balls (Z,) carry load on a race, idle ones excepted."""
+    loads = loads_on(solution, race)
+    return np.asarray(loads > max(NO_LOAD, IDLE * loads.max()))
+
+
 def pressures(solution: Solution, rating: Rating) -> dict[Race, float]:
     """Largest Hertz pressure on each race [Pa]."""
     return {race: float(peak_pressure(rating.contact(race), loads_on(solution, race).max())) for race in RACES}
@@ -131,7 +139,7 @@ def edge_angles(solution: Solution, rating: Rating, race: Race) -> Array:
     angles = solution.inner_angle if race == "inner" else solution.outer_angle
     share = rating.contact(race).semi_major / rating.groove(race) * np.cbrt(np.maximum(loads, 0.0))
     size = angles if rating.drawing.contact_angle > 0.0 else np.abs(angles)
-    return np.where((loads > NO_LOAD) & (size >= 0.0), size + np.arcsin(np.minimum(share, 1.0)), -np.inf)
+    return np.where(carrying(solution, race) & (size >= 0.0), size + np.arcsin(np.minimum(share, 1.0)), -np.inf)
 
 
 def _climbing(solution: Solution, rating: Rating, race: Race) -> tuple[bool, str]:
@@ -161,29 +169,32 @@ def needed_friction(solution: Solution, rating: Rating) -> float:
             share = weight / (1.0 + weight)
         pull = 2.0 * np.abs(solution.gyroscopic_moment) / rating.drawing.ball_diameter
         needed = np.maximum(share * pull / inner, (1.0 - share) * pull / outer)
-    return float(np.where((inner > 0.0) & (outer > 0.0), needed, 0.0).max())
+    return float(np.where(carrying(solution, "inner") & (outer > 0.0), needed, 0.0).max())
 
 
 def remarks(solution: Solution, rating: Rating, name: str = "") -> list[Remark]:
     """Remarks on the equilibrium of a row; ``name`` of the row, where there are two."""
     row = f"{name} row: " if name else ""
-    touching, angle = solution.inner_load > NO_LOAD, np.degrees(solution.inner_angle)
-    size, clear = len(touching), int(np.sum(~touching))
+    touching, angle = carrying(solution, "inner"), np.degrees(solution.inner_angle)
+    size, clear = len(touching), int(np.sum(solution.inner_load <= NO_LOAD))
+    idle = size - clear - int(np.sum(touching))
     steepest = float(np.where(touching, np.abs(angle), 0.0).max())
     steep, turned = steepest > math.degrees(STEEPEST), int(np.sum(touching & (angle < 0.0)))
     needed, (inner, outer) = needed_friction(solution, rating), pressures(solution, rating).values()
     climbs = {race: _climbing(solution, rating, race) for race in RACES}
-    very_steep = bool(np.abs(solution.inner_angle).max() > STEEPEST)
+    very_steep = bool(np.abs(solution.inner_angle[touching]).max(initial=0.0) > STEEPEST)
     # fmt: off
     listed = [
         ("loose-ring", "unloaded", clear == size,
             "no ball touches the inner raceway, so the position of the ring is undetermined; load the ring or reduce the clearance"),
         ("clear-balls", "clear balls", 0 < clear < size, f"{clear} of {size} balls are clear of the inner raceway"),
+        ("clear-balls", "idle balls", idle > 0,
+            f"{idle} of {size} balls carry less than {100.0 * IDLE:g} % of the largest ball load; more axial preload would load them"),
         ("dent", "inner dent", inner > BALLS, dent_sentence(inner, BALLS, "inner")),
         ("dent", "outer dent", outer > BALLS, dent_sentence(outer, BALLS, "outer")),
         ("no-shoulder", "steep angle", steep,
             f"inner angles reach {steepest:.0f} deg, beyond any shoulder: rotation pushes the inner ring off its balls; "
-            "preload it axially or reduce the speed"),
+            "raise its axial preload or reduce the speed"),
         ("no-shoulder", "negative angle", rating.drawing.contact_angle > 0.0 and turned > 0 and not steep,
             f"{turned} balls carry load at negative angles, where an angular contact bearing has no shoulder; reverse the "
             "thrust or pair the bearing"),

@@ -95,3 +95,22 @@ def test_a_sweep_names_the_points_that_climb() -> None:
     found = sweep(thrust(1.0, inner_shoulder_height_mm=height), {"operation.axial_load_N": [1e3, 1e4, 2.1e4, 3e4]})
     notes = {note["about"]: note["points"] for note in found.notes}
     assert notes["inner shoulder"] == [2, 3]
+
+
+def test_idle_balls_neither_climb_nor_slip():
+    """Unit: at 10 rpm the balls without load carry 1e-7 of the largest, by their centrifugal force: a note counts them, and none warns."""
+    scene = Scene.from_dict(
+        {
+            "bearing": {
+                "kind": "angular_contact_ball", "balls": 15, "ball_diameter_mm": 15.875, "pitch_diameter_mm": 85.0,
+                "contact_angle_deg": 40.0, "inner_groove_factor": 0.52, "outer_groove_factor": 0.53,
+            },
+            "operation": {"inner_speed_rpm": 10.0, "radial_load_N": 3000.0, "preload_N": 2000.0, "tilt": "fixed"},
+        }
+    )  # fmt: skip
+    slow, fast = (equilibrium(each) for each in (scene, scene.changed({"operation.inner_speed_rpm": 6000.0})))
+    loads = [ball.inner_load_N for ball in slow.row_reports[""].balls]
+    assert 0.0 < min(loads) < 1e-6 * max(loads)
+    assert [note.code for note in slow.notes] == ["clear-balls"]
+    assert slow.notes[0].startswith("10 of 15 balls carry less than 0.1 % of the largest ball load")
+    assert {"no-shoulder", "gyroscopic-slip"} <= {note.code for note in fast.notes}
