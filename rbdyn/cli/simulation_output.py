@@ -346,8 +346,11 @@ def _inputs(result: SimulationResult) -> Table:
 def _friction_sentence(check: FrictionCheck) -> str:
     """The maker's friction in a line."""
     share = "no ratio at zero load or speed" if check.ratio is None else f"power loss is {check.ratio:.2f} of SKF's"
-    moments = f"rolling {check.skf_rolling_moment_N_mm:.3g}, sliding {check.skf_sliding_moment_N_mm:.3g} N mm"
-    return f"friction by SKF's model {check.skf_power_W:.3g} W ({moments}), ISO 15312 heat {check.iso_15312_heat_W:.3g} W; {share}"
+    moments = (
+        f"rolling {shown(check.skf_rolling_moment_N_mm, 3)}, sliding {shown(check.skf_sliding_moment_N_mm, 3)} N mm"
+    )
+    powers = f"{shown(check.skf_power_W, 3)} W ({moments})", f"{shown(check.iso_15312_heat_W, 3)} W"
+    return f"friction by SKF's model {powers[0]}, ISO 15312 heat {powers[1]}; {share}"
 
 
 def _losses(result: SimulationResult) -> list[Block]:

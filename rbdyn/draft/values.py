@@ -5,6 +5,7 @@ import math
 from collections import defaultdict
 from typing import Any, NamedTuple
 
+from rbdyn.base.words import shown
 from rbdyn.draft.options import POLYAMIDE_NAME, Options
 from rbdyn.life import rollers
 from rbdyn.properties import catalogue
@@ -365,7 +366,7 @@ def _cage(subject: Subject, inside: catalogue.RollerInterior) -> Values:
         if cage.bar_width == catalogue.WIDEST_BAR * inside.roller_diameter
         else inside.bar_width_by,
         "guide_clearance": guide if landed else None,
-        "cage_mass": cage.volume * density,
+        "cage_mass": shown(cage.volume * density, 3),
         "land_width": round(cage.side_ring_width, 2) if landed else None,
         "cage_material": POLYAMIDE if soft else json.dumps(kind.material),
     }

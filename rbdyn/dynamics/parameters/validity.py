@@ -11,6 +11,7 @@ import numpy as np
 
 from rbdyn.base.faults import RPM
 from rbdyn.base.notes import Note, Notes
+from rbdyn.base.words import shown
 from rbdyn.contact.film_thickness import half_width, hertz_pressure
 from rbdyn.contact.hertz_line import ROLLERS, palmgren, pressure_notes
 from rbdyn.contact.rolling_resistance import THINNEST_LAYER, inlet
@@ -100,7 +101,7 @@ def friction_notes(check: FrictionCheck | None) -> Notes:
     if check is None or check.ratio is None or low <= check.ratio <= high:
         return ()
     sentence = (
-        f"power loss: it is {check.ratio:.2g} times the {check.skf_power_W:.3g} W of SKF's friction model, outside {low:g} to {high:g}. "
+        f"power loss: it is {shown(check.ratio, 2)} times the {shown(check.skf_power_W, 3)} W of SKF's friction model, outside {low:g} to {high:g}. "
         "Compare the power terms, the oil and lubricant.supply"
     )
     return (Note("maker-loss", sentence),)
@@ -258,9 +259,11 @@ def left_out_notes(scene: Scene, power_loss: float) -> Notes:
             power = item.power(scene)
             if power > NOTED_SHARE * power_loss > 0.0:
                 share = power / power_loss
-                size = f"{100.0 * share:.2g} %" if share < 1.0 else f"{share:.2g} times the simulated loss"
+                size = f"{100.0 * share:.2g} %" if share < 1.0 else f"{shown(share, 2)} times the simulated loss"
                 code = "omission" if share > LARGE_SHARE else "left-out"
-                sentence = f"not modelled: {item.name}, which would cause about {power:.2g} W ({size}) {item.changes}"
+                sentence = (
+                    f"not modelled: {item.name}, which would cause about {shown(power, 2)} W ({size}) {item.changes}"
+                )
                 notes.append(Note(code, sentence))
         elif item.matters is not None and item.matters(scene):
             notes.append(Note("left-out", f"not modelled: {item.name}, which would cause {item.changes}"))
