@@ -81,6 +81,21 @@ class Response(NamedTuple):
 
 
 @law
+def spin_lookahead(tangential):
+    """Share of a step by which ``verlet`` adds the last change of the rates to spins that it predicts."""
+
+
+@spin_lookahead.body(RigidContact)
+def _(tangential):
+    return 0.0
+
+
+@spin_lookahead.body(ElasticContact)
+def _(tangential):
+    return 0.5
+
+
+@law
 def steady_traction(tangential, model, slip, load):
     """``SteadyTraction`` of a traction law at a slip [m/s] and a load [N]."""
 

@@ -114,8 +114,7 @@ class Run:
         self.control = self.control._replace(step_budget=max(self.control.step_budget, self._budget(turns)))
 
     def _budget(self, turns: float) -> int:
-        """Steps that so many shaft turns may take; six of Verlet cost as much as one of Dormand and Prince."""
-        steps = self.scene.numerics.step_budget_per_turn * (6 if self.explicit == "verlet" else 1)
+        steps = alike(self.explicit, self.scene.numerics.step_budget_per_turn)
         return int(min(steps * math.ceil(turns), 2**62))
 
     def to(self, turns: float) -> None:
@@ -190,32 +189,35 @@ def prepare(scene: Scene, bearing: RollerBearing) -> float:
 
 
 EXPLICIT = ("rk45", "rk43", "verlet")
-# From this tolerance on the third-order error estimates of Kutta's pair and of Verlet cost fewer right-hand sides than the fifth
-# order saves. There is no trial, which would compile both.
+# From this tolerance on one right-hand side a step saves more of them than the fifth order does. There is no trial, which
+# would compile both.
 LOOSE_FROM = 5e-3
 # Length of the trial, after as long a start, and its steps at most.
 TRIAL_TURNS, TRIAL_STEPS = 0.05, 20_000
 # From this share of steps limited by stability on a run counts as stiff.
 STIFF_SHARE = 0.5
-# The implicit method takes 100 to 500 steps a turn, however stiff the bearing: below this number the explicit one is cheaper,
-# and a limit by stability deserves no note.
-FEWEST_STEPS_PER_TURN = 2000
+# The implicit method takes 100 to 500 steps a turn, however stiff the bearing: below this number of right-hand sides a turn the
+# explicit one is cheaper, and a limit by stability deserves no note.
+FEWEST_PER_TURN = 8000
 # Processor time of the implicit method over that of the explicit one, per right-hand side: linear algebra, and
 # right-hand sides of one roller that fill no vectors (10 rollers, measured).
 IMPLICIT_OVERHEAD = 3.0
 
 
-def explicit_method(scene: Scene) -> str:
-    """The explicit method that a scene starts with: the one it names, else "verlet" or "rk43" by its contacts, or "rk45".
+def alike(method: str, steps: int) -> int:
+    """Steps of a method that cost as much as so many ``steps`` of Dormand and Prince: six of Verlet are one."""
+    return 6 * steps if method == "verlet" else steps
 
-    For the bearing of Chen et al. 2022 rk43 at 1e-2 takes 1890 right-hand sides a turn, rk45 2510 at 1e-3, the loosest at
-    which it is free of bias; at 1e-3 rk43 takes 3590. Elastic contacts hold the steps of both pairs by stability.
+
+def explicit_method(scene: Scene) -> str:
+    """The explicit method that a scene starts with: the one it names, else "verlet" or, at tight tolerances, "rk45".
+
+    For the bearing of Chen et al. 2022 verlet at 1e-2 takes 890 right-hand sides a turn, rk43 1890, and rk45 2510 at 1e-3, the
+    loosest at which it is free of bias. At 2000 rpm stability limits them all, to 7000, 14 100 and 24 700.
     """
     if scene.numerics.method in EXPLICIT:
         return scene.numerics.method
-    if scene.numerics.rtol < LOOSE_FROM:
-        return "rk45"
-    return "verlet" if scene.traction.elasticity else "rk43"
+    return "rk45" if scene.numerics.rtol < LOOSE_FROM else "verlet"
 
 
 def method_of(name: str, scene: Scene, bearing: RollerBearing) -> Any:
@@ -252,7 +254,7 @@ def cheaper_method(
     if scene.traction.elasticity:
         return pair, np.zeros(advance.STIFFNESS)
     trial_s = TRIAL_TURNS * scene.turn_s
-    short = control_by(pair)._replace(step_budget=TRIAL_STEPS)
+    short = control_by(pair)._replace(step_budget=alike(pair, TRIAL_STEPS))
     run, book = _copy(carry), advance.Tally(*(sums.copy() for sums in tally))
     run.clock[advance.TRACED] = math.inf
     status = advance.advance(bearing, short, run, book, trial_s, sample_step)
@@ -267,15 +269,15 @@ def cheaper_method(
     if status not in (advance.FINISHED, advance.STEP_BUDGET):
         return "rosenbrock", run.stiffness
     turns = (run.clock[advance.NOW] - start.clock[advance.NOW]) / scene.turn_s
-    steps = run.counts[advance.ACCEPTED] + run.counts[advance.REJECTED]
-    if held_by_stability(run.stiffness) < STIFF_SHARE or steps < FEWEST_STEPS_PER_TURN * turns:
+    ours = run.counts[advance.DERIVATIVES] - derivatives
+    if held_by_stability(run.stiffness) < STIFF_SHARE or ours < FEWEST_PER_TURN * turns:
         return pair, run.stiffness
     start = start._replace(method=method_of("rosenbrock", scene, bearing))
     short = control_by("rosenbrock")._replace(step_budget=TRIAL_STEPS)
     if advance.advance(bearing, short, start, book, run.clock[advance.NOW], sample_step) != advance.FINISHED:
         return pair, run.stiffness
     cost = IMPLICIT_OVERHEAD * (start.counts[advance.DERIVATIVES] - derivatives)
-    return "rosenbrock" if cost < run.counts[advance.DERIVATIVES] - derivatives else pair, run.stiffness
+    return "rosenbrock" if cost < ours else pair, run.stiffness
 
 
 def _copy(carry: advance.Carry) -> advance.Carry:
@@ -316,8 +318,8 @@ def stiffness_notes(scene: Scene, runs: Sequence[Replicate]) -> Notes:
         )
         return (Note("method", sentence),)
     turns = sum(float(run.durations.sum()) for run in runs) / scene.turn_s
-    steps = sum(run.accepted_steps + run.rejected_steps for run in runs)
-    if cost["held_by_stability"] < STIFF_SHARE or steps < FEWEST_STEPS_PER_TURN * turns:
+    derivatives = sum(run.derivatives for run in runs)
+    if cost["held_by_stability"] < STIFF_SHARE or derivatives < FEWEST_PER_TURN * turns:
         return ()
     limit = (
         f"method: stability, not accuracy, limits {100.0 * cost['held_by_stability']:.0f} % of the steps: the fastest motion takes "

@@ -210,11 +210,10 @@ class Numerics(Consistent, Sparse):
 
     method: Literal["auto", "rk45", "rk43", "verlet", "rosenbrock"] = "auto"
     """Integrator. rk45: explicit, Dormand-Prince. rk43: explicit, Kutta's 3/8 rule. verlet: explicit, velocity Verlet with one
-    right-hand side a step. With traction.elasticity at rtol 1e-2 it takes about half the time of rk43 for equal errors of impact,
-    whirl and loss; below 1e-3 its second order costs more. Slow bearings without elasticity need rtol 1e-3: at 1e-2 the power
-    balance of the bearing of Chen et al. 2022 at 2000 rpm misses 0.5 %. rosenbrock: linearly implicit, RODAS4, for scenes where
-    stability limits explicit steps. auto: at rtol 5e-3 and above verlet with traction.elasticity and rk43 without, rk45 below,
-    unless a trial at the start of a run shows that rosenbrock is cheaper."""
+    right-hand side a step. At rtol 1e-2 verlet takes about half the time of rk43, and in slow bearings it is more exact: the loss
+    of the bearing of Chen et al. 2022 at 2000 rpm is off by -0.1 +- 0.5 %, with rk43 by +0.9 %. Below 1e-3 its second order costs
+    more than rk45. rosenbrock: linearly implicit, RODAS4, for scenes where stability limits explicit steps. auto: verlet at rtol
+    5e-3 and above and rk45 below, unless a trial at the start of a run shows that rosenbrock is cheaper."""
     rtol: Annotated[float, Field(ge=1e-13, le=0.1)] = 1e-2
     """Relative tolerance of a step: the error in approach and speed of a raceway contact at its mean load share. Effect:
     errors at 1e-2 for the bearing of Chen et al. 2022 are impact -0.05 +- 0.12 %, whirl +0.1 +- 0.4 %, loss 0.000 +- 0.008 %.

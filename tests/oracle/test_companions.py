@@ -153,22 +153,29 @@ def test_unit_companions_may_take_the_steps_they_need(make_scene):
     plan = usual_companions(scene)._replace(method="rk43", longest_step=1e-3 * scene.turn_s)
     bearing = roller_bearing(scene)
     short, usual = (recording_of(scene, bearing, None, 0, one, Stop()) for one in (plan, None))
-    assert short.run.control.step_budget == 2000 and usual.run.control.step_budget == 100
+    assert short.run.control.step_budget == 2000 and usual.run.control.step_budget == 6 * 100
     assert short.run.control.largest_step == pytest.approx(1e-3 * scene.turn_s)
 
 
 @pytest.mark.slow
 def test_oracle_numerical_error_of_a_slow_bearing(make_scene):
-    """Oracle: at 2000 rpm and 4 kN the stated numerical error of the loss holds a run at rtol 1e-6, and is no blanket."""
+    """Oracle: at 2000 rpm and 4 kN the stated numerical error of the loss holds a run at rtol 1e-6, and is no blanket. Verlet, whose
+    steps damp no vibration, has the same loss at the default tolerance.
+    """
     length = (
         "numerics.turns=30",
         "numerics.discard_turns=10",
         "numerics.replicates=16",
         "numerics.impact_window_turns=10",
     )
-    stated = simulate(make_scene(*SLOW, *length, "numerics.companion=true")).power_loss_W
+    default, stated = (
+        simulate(make_scene(*SLOW, *length, "numerics.companion=true", *method)).power_loss_W
+        for method in ((), ("numerics.method=rk43",))
+    )
     truth = simulate(make_scene(*SLOW, *length, "numerics.rtol=1e-6")).power_loss_W
     bias = stated.value - truth.value
     noise = math.hypot(stated.statistical_error, truth.statistical_error)
     assert abs(bias) > 2.0 * noise, "stability no longer holds the steps: look for another scene"
     assert abs(bias) - noise < stated.numerical_error < 2.0 * abs(bias) + noise
+    noise = math.hypot(default.statistical_error, truth.statistical_error)
+    assert abs(default.value - truth.value) < 1.5 * noise and default.numerical_error < noise < 0.1 * abs(truth.value)

@@ -74,11 +74,11 @@ def test_unit_slower_contacts_are_no_impacts(threshold, count):
 
 def test_unit_impacts_on_film_and_lips():
     """Unit: with a film an impact begins where the film's floor is reached, slower than the roller came; lips count as walls do."""
-    wet, _, _ = on_wall("model.pocket_film=true", method="rk43")
+    wet, _, _ = on_wall("model.pocket_film=true", method="verlet")
     assert wet.tally.impacts[0, NUMBER] == 1.0
     assert 0.0 < wet.tally.impacts[0, SQUARES] < SPEED**2
     lips = ("cage.guidance=roller", "cage.pocket_radial_clearance_mm=0.1")
-    lipped, _, _ = on_wall(*lips, method="rk43")
+    lipped, _, _ = on_wall(*lips, method="verlet")
     assert lipped.tally.impacts[0, SQUARES] == pytest.approx(SPEED**2, rel=1e-9)
 
 

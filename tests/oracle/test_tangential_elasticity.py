@@ -164,8 +164,8 @@ def test_unit_nothing_jumps_at_touch():
 def test_unit_tightest_tolerance_passes_touch():
     """Unit: at the tolerance of a reference, contacts that open and close leave the steps far above their limit."""
     data = read_toml(ROOT / "tests" / "helpers" / "stiff_catalogue_bearing.toml")
-    # With the films and the method of scenes by `rbdyn new`, which other tests compile.
-    scene = Scene.from_dict(data, "scene", (ELASTIC, "lubricant.inlet_distance=5.0", "numerics.method=rk43"))
+    # With the films of scenes by `rbdyn new`, which other tests compile.
+    scene = Scene.from_dict(data, "scene", (ELASTIC, "lubricant.inlet_distance=5.0", "numerics.method=rk45"))
     run = Run(scene, roller_bearing(scene), 0, 1e-12, Stop())
     run.to(0.1)
     steps = run.carry.counts[ACCEPTED]

@@ -523,7 +523,7 @@ def test_a_search_and_a_robust_judgement_over_a_duty_are_the_same_with_any_worke
     """
     inputs = (
         '[robust]\npoints = 32\n[uncertain]\nset = ["numerics.turns=2", "numerics.discard_turns=1", "numerics.replicates=2", '
-        '"numerics.extend=false", "numerics.companion=false", "numerics.impact_window_turns=1", "numerics.method=rk43"]\n'
+        '"numerics.extend=false", "numerics.companion=false", "numerics.impact_window_turns=1"]\n'
         '[adaptive]\nbudget = 36\nset = ["numerics.extend_limit=1"]\n[front]'
     )
     relative = (POWER, f'{POWER}upper = 245.0\naggregate = "worst_relative"\npoints = ["cruise"]\n')

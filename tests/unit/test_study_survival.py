@@ -282,7 +282,7 @@ def test_full_disk_is_one_sentence_and_the_study_goes_on_later(tmp_path):
 def test_scenes_of_the_same_laws_are_prepared_once(tmp_path, monkeypatch):
     from rbdyn.dynamics import simulate as module
 
-    study = Problem.load(short_study(tmp_path, SHORT + ",method='rk43'"))
+    study = Problem.load(short_study(tmp_path, SHORT))
     prepared = []
 
     def prepare(scene, bearing):

@@ -398,7 +398,7 @@ def test_unit_a_cold_start_is_steady(oil, inlet):
     changes = {"lubricant": {**FLOW, "oil": oil, "oil_inlet_temperature_C": inlet}, "thermal": {"ambient_C": inlet}}
     # Traction and method that other tests compile: those of these oils, and the choice of a method, would be for this one alone.
     changes["traction"] = {"model": "four_constant"}
-    found = simulate(_scene(**changes, numerics={**SHORTER, "method": "rk43"}), workers=1, notice=None)
+    found = simulate(_scene(**changes, numerics=SHORTER), workers=1, notice=None)
     assert found.status == "ok" and found.thermal.gain < 0.7
     assert min(figure.value - (figure.error or 0.0) for figure in found.temperatures_C.values()) > inlet
     assert all(min(state.values()) >= inlet - 1e-9 for state in found.thermal.path_C[1:])
