@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Self
 
 import numpy as np
 
-from rbdyn.base.arrays import Array, Mask
+from rbdyn.base.arrays import Array
 from rbdyn.base.blocks import Column, Sheet, columns_of, within
 from rbdyn.base.faults import MethodError
 from rbdyn.base.notes import Note, Notes
@@ -25,7 +25,7 @@ from rbdyn.life.balls import dynamic_capacity, rated_capacities, row_life
 from rbdyn.properties.materials import equivalent_modulus
 from rbdyn.quasistatic.row.ball import FixedShare, FrictionShare
 from rbdyn.quasistatic.row.equilibrium import INNER_ANGLE, INNER_LOAD, MOMENT, OUTER_ANGLE, OUTER_LOAD, PULL, Solution
-from rbdyn.quasistatic.row.model import RowModel
+from rbdyn.quasistatic.row.model import IDLE, NO_LOAD, RowModel, carrying
 from rbdyn.quasistatic.runout.turn import Runout
 from rbdyn.result import BallHeatBalance, ColdSeizure, Film, SavedRecord, StartResult
 from rbdyn.scene.ball import BallRow, BallScene
@@ -67,10 +67,6 @@ OILED_FRICTION = 0.07
 TIPPED = 1e-3
 Race = Literal["inner", "outer"]
 RACES: tuple[Race, Race] = ("inner", "outer")
-# Ball load [N] below which a ball counts as unloaded.
-NO_LOAD = 1e-9
-# Share of the largest ball load below which a ball is idle: its angle and its gyroscopic moment do no harm.
-IDLE = 1e-3
 
 
 class Rating(NamedTuple):
@@ -103,12 +99,6 @@ def loads_on(solution: Solution, race: Race) -> Array:
     return solution.inner_load if race == "inner" else solution.outer_load
 
 
-def carrying(solution: Solution, race: Race) -> Mask:
-    """Whether the balls (Z,) carry load on a race, idle ones excepted."""
-    loads = loads_on(solution, race)
-    return np.asarray(loads > max(NO_LOAD, IDLE * loads.max()))
-
-
 def pressures(solution: Solution, rating: Rating) -> dict[Race, float]:
     """Largest Hertz pressure on each race [Pa]."""
     return {race: float(peak_pressure(rating.contact(race), loads_on(solution, race).max())) for race in RACES}
@@ -139,7 +129,7 @@ def edge_angles(solution: Solution, rating: Rating, race: Race) -> Array:
     angles = solution.inner_angle if race == "inner" else solution.outer_angle
     share = rating.contact(race).semi_major / rating.groove(race) * np.cbrt(np.maximum(loads, 0.0))
     size = angles if rating.drawing.contact_angle > 0.0 else np.abs(angles)
-    return np.where(carrying(solution, race) & (size >= 0.0), size + np.arcsin(np.minimum(share, 1.0)), -np.inf)
+    return np.where(carrying(loads) & (size >= 0.0), size + np.arcsin(np.minimum(share, 1.0)), -np.inf)
 
 
 def _climbing(solution: Solution, rating: Rating, race: Race) -> tuple[bool, str]:
@@ -169,13 +159,13 @@ def needed_friction(solution: Solution, rating: Rating) -> float:
             share = weight / (1.0 + weight)
         pull = 2.0 * np.abs(solution.gyroscopic_moment) / rating.drawing.ball_diameter
         needed = np.maximum(share * pull / inner, (1.0 - share) * pull / outer)
-    return float(np.where(carrying(solution, "inner") & (outer > 0.0), needed, 0.0).max())
+    return float(np.where(carrying(solution.inner_load) & (outer > 0.0), needed, 0.0).max())
 
 
 def remarks(solution: Solution, rating: Rating, name: str = "") -> list[Remark]:
     """Remarks on the equilibrium of a row; ``name`` of the row, where there are two."""
     row = f"{name} row: " if name else ""
-    touching, angle = carrying(solution, "inner"), np.degrees(solution.inner_angle)
+    touching, angle = carrying(solution.inner_load), np.degrees(solution.inner_angle)
     size, clear = len(touching), int(np.sum(solution.inner_load <= NO_LOAD))
     idle = size - clear - int(np.sum(touching))
     steepest = float(np.where(touching, np.abs(angle), 0.0).max())

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rbdyn.base.arrays import Array
+from rbdyn.base.arrays import Array, Mask
 from rbdyn.base.faults import InputError
 from rbdyn.contact.point_contact import PointContact, ball_on_race
 from rbdyn.mounting.rings import UNCHANGED, GrooveChange
@@ -18,6 +18,15 @@ from rbdyn.scene.fits import row_change
 INNER_SHARE = {"outer": 0.0, "inner": 1.0, "half": 0.5}
 # Least blend load [N], which keeps quotients finite where nothing turns.
 VANISHING = 1e-200
+# Ball load [N] below which a ball counts as unloaded.
+NO_LOAD = 1e-9
+# Share of the largest ball load below which a ball is idle: its angle and its gyroscopic moment do no harm.
+IDLE = 1e-3
+
+
+def carrying(loads: Array) -> Mask:
+    """Whether balls carry their ``loads`` [N] (Z,) on a raceway; idle ones do not."""
+    return np.asarray(loads > max(NO_LOAD, IDLE * loads.max()))
 
 
 class RowModel(NamedTuple):
