@@ -14,6 +14,7 @@ Resampling-based multiple testing (1993), section 2.3, for the smallest of sever
 """
 
 from collections.abc import Sequence
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -133,7 +134,13 @@ def prequential(row: Whole, validation: Mask, random: np.random.Generator) -> tu
 def power_of(output: Whole, row: Whole, validation: Mask, seed: int) -> Power:
     """The power of a design by the output, the row and the use of each cell (c,); ``seed`` is that of the calibration."""
     order, start = prequential(row, validation, np.random.default_rng(seed))
-    counts = np.unique(output[np.concatenate(order[start:])], return_counts=True)[1]
+    return _power_of_counts(*np.unique(output[np.concatenate(order[start:])], return_counts=True)[1].tolist())
+
+
+@cache
+def _power_of_counts(*numbers: int) -> Power:
+    """The power by the number of predicted cells of each output."""
+    counts = np.array(numbers)
     apart = np.random.default_rng(0).chisquare(counts, (TABLES, counts.size))
     sums, freedom = (np.column_stack([parts.sum(axis=1), parts]) for parts in (apart, counts[None]))
     limit = np.sort(_exact_chances(freedom, sums))[int(REJECTION_LEVEL * TABLES)]
@@ -144,5 +151,5 @@ def power_of(output: Whole, row: Whole, validation: Mask, seed: int) -> Power:
 
 def _exact_chances(freedom: Array, sums: Array) -> Array:
     """The smallest probability (n,) of sums (n, g) as small or as large, all together and by output."""
-    chances: Array = np.minimum(special.chdtr(freedom, sums), special.chdtrc(freedom, sums)).min(axis=1)
-    return chances
+    below = special.chdtr(freedom, sums)
+    return np.asarray(np.minimum(below, 1.0 - below).min(axis=1))
