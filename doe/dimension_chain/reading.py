@@ -201,6 +201,9 @@ def read_chains(path: Path | str) -> dict[str, Chain]:
     """
     path = Path(path)
     data, source = read_toml(path), str(path)
+    if "factor" in data:
+        fault = "is a study, whose chains follow its selected clearances; run doe study, or write its chains to their own file"
+        refuse([f"{source}: {fault}"])
     if "chain" not in data:
         return {path.stem: chain_from(data, source)}
     chains = validated(Chains, data, source).chain

@@ -213,3 +213,15 @@ def test_command_line_a_study_whose_chain_misses_ends_with_one(tmp_path, monkeyp
     again = doe("study", str(path), "--out", str(tmp_path / "out"), "--json")
     record = json.loads(again.stdout)
     assert again.returncode == 1 and record["status"] == "missed" and list(record["missed_chains"]) == ["pocket"]
+
+
+def test_chains_of_a_study_need_the_study(tmp_path):
+    """Command line: ``doe chain`` of a study says where its chains are solved, not that other tables of the study are unknown keys."""
+    study = tmp_path / "study.toml"
+    study.write_text(
+        '[scene]\nfile = "x.toml"\n[confirmation]\n[[factor]]\nname = "a"\n[[chain]]\nname = "radial"\nfactor = "a"\n'
+    )
+    with pytest.raises(
+        InputError, match=r"study.toml: is a study, .*; run doe study, or write its chains to their own file"
+    ):
+        read_chains(study)
