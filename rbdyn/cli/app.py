@@ -100,8 +100,10 @@ def simulate(
     from rbdyn.dynamics.ensemble import plan_of, threads_of
     from rbdyn.dynamics.simulate import simulate as run_scene
 
-    if (say := console.notice) is not None and aim is None:
-        say(plan_of(loaded, threads_of(workers)))
+    if (say := console.notice) is not None:
+        # A slip of a unit can make the run take hours, so it is said before.
+        for sentence in (*loaded.unit_notes, *[plan_of(loaded, threads_of(workers))] * (aim is None)):
+            say(sentence)
     with console.progress("simulating") as progress:
         result = run_scene(loaded, workers, progress, target=aim, notice=say)
     from rbdyn.cli import simulation_output

@@ -125,6 +125,14 @@ def test_command_line_usage_errors(command):
     assert command("simulate", EXAMPLE, "--workers", "0").returncode == 2
 
 
+def test_command_line_slip_of_a_unit_is_said_before_the_run(command):
+    """Command line: a cage of 0.05 g takes a hundred times as long to simulate, so the first line says that the mass is unusual."""
+    budget = "numerics.step_budget_per_turn=100"
+    shown = command("simulate", EXAMPLE, *QUICK, "--set", "cage.mass_g=0.05", "--set", budget)
+    first, plan, _ = shown.stderr.splitlines()
+    assert first.startswith("note: cage.mass_g = 0.05: is outside the usual ") and plan.endswith(" at once")
+
+
 def test_command_line_failing_run(command):
     """Command line: a run that cannot go on is exit code 1 and one sentence: which, where, why, what to do."""
     arguments = ("simulate", EXAMPLE, *QUICK, "--set", "numerics.step_budget_per_turn=100")
