@@ -23,6 +23,7 @@ from rbdyn.dynamics.forces.state import CAGE_X, INNER_ANGLE, OUTER_ANGLE, RING_X
 from rbdyn.dynamics.integrators import advance
 from rbdyn.dynamics.integrators.runge_kutta import DormandPrince, Kutta
 from rbdyn.dynamics.parameters.state import absolute_tolerance, increments, layout_of, scales, start_state, wall_of
+from rbdyn.dynamics.statistics.metrics import STIFF_SHARE, held_by_stability
 from rbdyn.dynamics.statistics.replicate import Replicate
 from rbdyn.scene import Scene
 
@@ -194,8 +195,6 @@ EXPLICIT = ("rk45", "rk43", "verlet")
 LOOSE_FROM = 5e-3
 # Length of the trial, after as long a start, and its steps at most.
 TRIAL_TURNS, TRIAL_STEPS = 0.05, 20_000
-# From this share of steps limited by stability on a run counts as stiff.
-STIFF_SHARE = 0.5
 # The implicit method takes 100 to 500 steps a turn, however stiff the bearing: below this number of right-hand sides a turn the
 # explicit one is cheaper, and a limit by stability deserves no note.
 FEWEST_PER_TURN = 8000
@@ -284,11 +283,6 @@ def _copy(carry: advance.Carry) -> advance.Carry:
     """A copy that shares only the work space."""
     data: dict[str, Any] = {key: part.copy() for key, part in carry._asdict().items() if isinstance(part, np.ndarray)}
     return carry._replace(**data)
-
-
-def held_by_stability(stiffness: Sequence[float] | np.ndarray) -> float:
-    """Share of the explicit steps tested that stability limited, not accuracy."""
-    return float(stiffness[advance.LIMITED] / stiffness[advance.TESTED]) if stiffness[advance.TESTED] > 0.0 else 0.0
 
 
 def largest_eigenvalue(stiffness: Sequence[float] | np.ndarray) -> float:

@@ -44,8 +44,9 @@ from rbdyn.dynamics.integrators.advance import BEFORE, DERIVATIVES, EIGENVALUES,
 START, END, PAST, ERROR = range(4)
 # Largest ratio of a step to the one before in predicted speeds: behind a step cut short the change of the rates is round-off.
 LONGEST_RATIO = 2.0
-# Second over first change of the rates, at most, of a vibration or a relaxation at the limit of its stability, where it is 2.
-SHARPEST_BEND = 2.2
+# Second over first change of the rates, at most: of a vibration it is h omega, and 2 of motions at the limit of their stability,
+# where the rates change their sign in each step and h |eigenvalue| is 1 (spins) to 1.4 (contacts).
+SHARPEST_VIBRATION, SHARPEST_BEND = 1.7, 2.2
 
 
 class Verlet(NamedTuple):
@@ -256,8 +257,9 @@ def compare_changes(method, k, stiffness, h, inverse_tolerance):
         first += change * change
     stiffness[TESTED] += 1.0
     if method.limit * method.limit * first < second < SHARPEST_BEND * SHARPEST_BEND * first:
+        bend = math.sqrt(second / first)
         stiffness[LIMITED] += 1.0
-        stiffness[EIGENVALUES] += math.sqrt(second / first) / h
+        stiffness[EIGENVALUES] += (bend if bend < SHARPEST_VIBRATION else 1.0) / h
 
 
 @laws.end_step.body(Verlet)
