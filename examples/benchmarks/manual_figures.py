@@ -72,6 +72,7 @@ def compared(page: Mapping[str, Any], runs: Mapping[str, Any]) -> Iterator[Compa
         words = " ".join(place[0].split())
         for k, (text, term) in enumerate(zip(place.groups(), figure["values"], strict=True)):
             value, error = valued(term, runs)
+            text = text.rstrip(".")  # of the end of a sentence
             digits = len(text.partition(".")[2])
             allowed = 0.501 * 10.0**-digits + math.sqrt(2.0) * error + figure.get("within", [0.0] * (k + 1))[k]
             yield Compared(page["file"], words, float(text), value, allowed)

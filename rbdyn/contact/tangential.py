@@ -36,7 +36,7 @@ import math
 from typing import NamedTuple
 
 from rbdyn.compiled.elementary import fma
-from rbdyn.compiled.kernel import kernel, law
+from rbdyn.compiled.kernel import kernel, law_of
 from rbdyn.contact.traction import growth, growth_by_table, traction, traction_by_table
 
 SMALLEST_SPRING_RATE = 1e-3  # k s [N/s], keeps times finite
@@ -80,13 +80,9 @@ class Response(NamedTuple):
     rate: float
 
 
-@law
+@law_of(RigidContact)
 def spin_lookahead(tangential):
     """Share of a step by which ``verlet`` adds the last change of the rates to spins that it predicts."""
-
-
-@spin_lookahead.body(RigidContact)
-def _(tangential):
     return 0.0
 
 
@@ -95,13 +91,9 @@ def _(tangential):
     return 0.5
 
 
-@law
+@law_of(RigidContact)
 def steady_traction(tangential, model, slip, load):
     """``SteadyTraction`` of a traction law at a slip [m/s] and a load [N]."""
-
-
-@steady_traction.body(RigidContact)
-def _(tangential, model, slip, load):
     return SteadyTraction(traction(model, slip, load), 0.0)
 
 
@@ -110,13 +102,9 @@ def _(tangential, model, slip, load):
     return SteadyTraction(traction(model, slip, load), growth(model, slip, load))
 
 
-@law
+@law_of(RigidContact)
 def steady_by_table(tangential, model, slip, load, value, slope):
     """``steady_traction`` of a law without its table, from value and slope of its ``table_cubic``."""
-
-
-@steady_by_table.body(RigidContact)
-def _(tangential, model, slip, load, value, slope):
     return SteadyTraction(traction_by_table(model, slip, load, value), 0.0)
 
 
@@ -126,13 +114,9 @@ def _(tangential, model, slip, load, value, slope):
     return SteadyTraction(steady, growth_by_table(model, slip, load, value, slope))
 
 
-@law
+@law_of(RigidContact)
 def response(tangential, steady, coefficient, load, slip, stiffness):
     """``Response`` of a contact of this stiffness [N/m] whose state is ``coefficient``; without load the state dies away."""
-
-
-@response.body(RigidContact)
-def _(tangential, steady, coefficient, load, slip, stiffness):
     return Response(steady.coefficient, 0.0)
 
 
@@ -187,13 +171,9 @@ def faded(tangential, coefficient):
     return -coefficient / (tangential.shortest_time + tangential.damping_time)
 
 
-@law
+@law_of(RigidContact)
 def coefficient_of(tangential, y, j):
     """Traction coefficient of roller ``j`` in the state ``y``; 0 where it is no state."""
-
-
-@coefficient_of.body(RigidContact)
-def _(tangential, y, j):
     return 0.0
 
 
@@ -202,14 +182,9 @@ def _(tangential, y, j):
     return y[tangential.start + j]
 
 
-@law
+@law_of(RigidContact)
 def keep_coefficient_rate(tangential, rate, lanes, place):
     """Write the rate of a contact to a work space."""
-
-
-@keep_coefficient_rate.body(RigidContact)
-def _(tangential, rate, lanes, place):
-    pass
 
 
 @keep_coefficient_rate.body(ElasticContact, StaggeredContact)
@@ -217,14 +192,9 @@ def _(tangential, rate, lanes, place):
     lanes[place] = rate
 
 
-@law
+@law_of(RigidContact)
 def add_coefficient_rate(tangential, rate, j, row, dy):
     """Put the rate of roller ``j`` into row ``row`` of ``dy``."""
-
-
-@add_coefficient_rate.body(RigidContact)
-def _(tangential, rate, j, row, dy):
-    pass
 
 
 @add_coefficient_rate.body(ElasticContact, StaggeredContact)
@@ -232,14 +202,9 @@ def _(tangential, rate, j, row, dy):
     dy[row, tangential.start + j] = rate
 
 
-@law
+@law_of(RigidContact)
 def relax_coefficients(tangential, rollers, y, row, dy):
     """Let the coefficients of all rollers die away, as where they do not touch, in row ``row`` of ``dy``."""
-
-
-@relax_coefficients.body(RigidContact)
-def _(tangential, rollers, y, row, dy):
-    pass
 
 
 @relax_coefficients.body(ElasticContact)
@@ -255,13 +220,9 @@ def _(tangential, rollers, y, row, dy):
         dy[row, tangential.start + j] = -y[tangential.start + j] / time
 
 
-@law
+@law_of(RigidContact)
 def staggered(tangential, half_step):
     """The law at the end of a step of twice ``half_step`` [s]."""
-
-
-@staggered.body(RigidContact)
-def _(tangential, half_step):
     return tangential
 
 
@@ -272,14 +233,9 @@ def _(tangential, half_step):
     )
 
 
-@law
+@law_of(RigidContact)
 def half_step_ahead(tangential, rollers, half_step, y, dy, row, end):
     """Write the coefficients of ``y`` half a step [s] later, by their rates in row ``row`` of ``dy``, to ``end``."""
-
-
-@half_step_ahead.body(RigidContact)
-def _(tangential, rollers, half_step, y, dy, row, end):
-    pass
 
 
 @half_step_ahead.body(ElasticContact)

@@ -21,7 +21,7 @@ from rbdyn.dynamics.forces.equations import OF_MOTION, RollerBearing, mechanical
 from rbdyn.dynamics.forces.race_samples import RaceSamples
 from rbdyn.dynamics.forces.state import CAGE_X, INNER_ANGLE, OUTER_ANGLE, RING_X, name
 from rbdyn.dynamics.integrators import advance
-from rbdyn.dynamics.integrators.runge_kutta import DormandPrince, Kutta
+from rbdyn.dynamics.integrators.runge_kutta import DormandPrince
 from rbdyn.dynamics.parameters.state import absolute_tolerance, increments, layout_of, scales, start_state, wall_of
 from rbdyn.dynamics.statistics.metrics import STIFF_SHARE, held_by_stability
 from rbdyn.dynamics.statistics.replicate import Replicate
@@ -189,7 +189,7 @@ def prepare(scene: Scene, bearing: RollerBearing) -> float:
     return time.perf_counter() - started
 
 
-EXPLICIT = ("rk45", "rk43", "verlet")
+EXPLICIT = ("rk45", "verlet")
 # From this tolerance on one right-hand side a step saves more of them than the fifth order does. There is no trial, which
 # would compile both.
 LOOSE_FROM = 5e-3
@@ -211,8 +211,8 @@ def alike(method: str, steps: int) -> int:
 def explicit_method(scene: Scene) -> str:
     """The explicit method that a scene starts with: the one it names, else "verlet" or, at tight tolerances, "rk45".
 
-    For the bearing of Chen et al. 2022 verlet at 1e-2 takes 890 right-hand sides a turn, rk43 1890, and rk45 2510 at 1e-3, the
-    loosest at which it is free of bias. At 2000 rpm stability limits them all, to 7000, 14 100 and 24 700.
+    For the bearing of Chen et al. 2022 verlet at 1e-2 takes 890 right-hand sides a turn, and rk45 2510 at 1e-3, the loosest at
+    which it is free of bias. At 2000 rpm stability limits both, to 7000 and 24 700.
     """
     if scene.numerics.method in EXPLICIT:
         return scene.numerics.method
@@ -220,7 +220,7 @@ def explicit_method(scene: Scene) -> str:
 
 
 def method_of(name: str, scene: Scene, bearing: RollerBearing) -> Any:
-    """The method "rk45", "rk43", "verlet" or "rosenbrock" for this bearing."""
+    """The method "rk45", "verlet" or "rosenbrock" for this bearing."""
     if name == "rosenbrock":
         if scene.traction.elasticity:
             raise MethodError(
@@ -233,7 +233,7 @@ def method_of(name: str, scene: Scene, bearing: RollerBearing) -> Any:
         from rbdyn.dynamics.integrators.verlet import Verlet
 
         return Verlet(2 * bearing.rollers)
-    return Kutta() if name == "rk43" else DormandPrince()
+    return DormandPrince()
 
 
 def cheaper_method(

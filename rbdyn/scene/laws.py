@@ -208,12 +208,11 @@ class Numerics(Consistent, Sparse):
 
     UNSAVED: ClassVar[Mapping[str, Any]] = {"stiffness": True}
 
-    method: Literal["auto", "rk45", "rk43", "verlet", "rosenbrock"] = "auto"
-    """Integrator. rk45: explicit, Dormand-Prince. rk43: explicit, Kutta's 3/8 rule. verlet: explicit, velocity Verlet with one
-    right-hand side a step. At rtol 1e-2 verlet takes about half the time of rk43, and in slow bearings it is more exact: the loss
-    of the bearing of Chen et al. 2022 at 2000 rpm is off by -0.1 +- 0.5 %, with rk43 by +0.9 %. Below 1e-3 its second order costs
-    more than rk45. rosenbrock: linearly implicit, RODAS4, for scenes where stability limits explicit steps. auto: verlet at rtol
-    5e-3 and above and rk45 below, unless a trial at the start of a run shows that rosenbrock is cheaper."""
+    method: Literal["auto", "rk45", "verlet", "rosenbrock"] = "auto"
+    """Integrator. verlet: explicit, velocity Verlet with one right-hand side a step. rk45: explicit, Dormand-Prince, for tight
+    tolerances: below 1e-3 the second order of verlet costs more. rosenbrock: linearly implicit, RODAS4, for scenes where stability
+    limits explicit steps. auto: verlet at rtol 5e-3 and above and rk45 below, unless a trial at the start of a run shows that
+    rosenbrock is cheaper."""
     rtol: Annotated[float, Field(ge=1e-13, le=0.1)] = 1e-2
     """Relative tolerance of a step: the error in approach and speed of a raceway contact at its mean load share. Effect:
     errors at 1e-2 for the bearing of Chen et al. 2022 are impact -0.05 +- 0.12 %, whirl +0.1 +- 0.4 %, loss 0.000 +- 0.008 %.

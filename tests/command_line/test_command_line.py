@@ -140,7 +140,7 @@ def test_command_line_failing_run(command):
     assert (shown.returncode, shown.stdout) == (1, "")
     plan, sentence = shown.stderr.splitlines()
     assert plan.endswith(" at once")
-    for words in ("replicate ", "seed 1", "shaft turn ", "step budget of 600 used up", "raise numerics.step_budget"):
+    for words in ("replicate ", "seed 1", "shaft turn ", "step budget of 3600 used up", "raise numerics.step_budget"):
         assert words in sentence
     again = command(*arguments, "--json")
     assert again.returncode == 1

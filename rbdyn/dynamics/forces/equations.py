@@ -11,7 +11,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rbdyn import losses
 from rbdyn.compiled.elementary import fast_cos_sin
 from rbdyn.compiled.kernel import entry, kernel, routine
 from rbdyn.contact.hertz_line import line_energy, line_load
@@ -19,6 +18,25 @@ from rbdyn.dynamics.forces import bodies, state
 from rbdyn.dynamics.forces.cage import guide_energy, guide_forces, pocket_contact, pocket_energy, pocket_gap
 from rbdyn.dynamics.forces.race_lanes import race_forces, with_open_films
 from rbdyn.dynamics.forces.races import Race, form_at, roller_radius
+from rbdyn.losses import (
+    DRAG,
+    INNER_ROLLING,
+    INNER_TRACTION,
+    LAND_DAMPING,
+    LAND_FILM,
+    LAND_FRICTION,
+    LOAD,
+    OUTER_TRACTION,
+    POCKET_DAMPING,
+    POCKET_FILM,
+    POCKET_FORCE,
+    POCKET_FRICTION,
+    POCKET_SQUEEZE,
+    RACE_DAMPING,
+    ROLLING,
+    SHAFT,
+    SUPPORT_DAMPING,
+)
 
 
 class RollerBearing(NamedTuple):
@@ -255,24 +273,24 @@ def derivative(bearing, y, row, dy, power, loads, scratch):
     accelerate_inner_ring(bearing, inner, ring_fx, ring_fy, row, dy)
     support_fx, support_fy = on_outer.x + land.outer_x, on_outer.y + land.outer_y
     support_loss = bodies.support_motion(bearing.outer_ring, bearing.gravity, support_fx, support_fy, y, row, dy)
-    power[row, losses.OUTER_TRACTION] = on_outer.traction
-    power[row, losses.INNER_TRACTION] = on_inner.traction
-    power[row, losses.ROLLING] = on_outer.rolling + on_inner.rolling
-    power[row, losses.RACE_DAMPING] = on_outer.damping + on_inner.damping
-    power[row, losses.POCKET_FRICTION] = pockets.friction
-    power[row, losses.POCKET_DAMPING] = pockets.damping
-    power[row, losses.POCKET_FILM] = pockets.film
-    power[row, losses.LAND_FILM] = land.film
-    power[row, losses.LAND_FRICTION] = land.friction
-    power[row, losses.LAND_DAMPING] = land.damping
-    power[row, losses.DRAG] = drag_loss
-    power[row, losses.SUPPORT_DAMPING] = support_loss
+    power[row, OUTER_TRACTION] = on_outer.traction
+    power[row, INNER_TRACTION] = on_inner.traction
+    power[row, ROLLING] = on_outer.rolling + on_inner.rolling
+    power[row, RACE_DAMPING] = on_outer.damping + on_inner.damping
+    power[row, POCKET_FRICTION] = pockets.friction
+    power[row, POCKET_DAMPING] = pockets.damping
+    power[row, POCKET_FILM] = pockets.film
+    power[row, LAND_FILM] = land.film
+    power[row, LAND_FRICTION] = land.friction
+    power[row, LAND_DAMPING] = land.damping
+    power[row, DRAG] = drag_loss
+    power[row, SUPPORT_DAMPING] = support_loss
     inner_moment, outer_moment = on_inner.moment + land.inner_moment, on_outer.moment + land.outer_moment
-    power[row, losses.SHAFT] = -inner_moment * inner.speed - outer_moment * outer.speed
-    power[row, losses.LOAD] = bodies.load_power(bearing.drive, acting, inner.vx, inner.vy)
-    power[row, losses.INNER_ROLLING] = on_inner.rolling
-    power[row, losses.POCKET_FORCE] = pockets.force
-    power[row, losses.POCKET_SQUEEZE] = pockets.squeeze
+    power[row, SHAFT] = -inner_moment * inner.speed - outer_moment * outer.speed
+    power[row, LOAD] = bodies.load_power(bearing.drive, acting, inner.vx, inner.vy)
+    power[row, INNER_ROLLING] = on_inner.rolling
+    power[row, POCKET_FORCE] = pockets.force
+    power[row, POCKET_SQUEEZE] = pockets.squeeze
     loads[row, state.POCKET_LOAD] = pockets.load
     loads[row, state.OUTER_LOAD] = on_outer.load
     loads[row, state.INNER_LOAD] = on_inner.load

@@ -1,4 +1,6 @@
-"""Explicit Runge-Kutta pairs: first-same-as-last, dense output; Hairer, Norsett and Wanner, Solving ODEs I, II.4.
+"""Dormand and Prince's explicit pair of order 5(4), six right-hand sides a step: first-same-as-last, dense output.
+
+After Hairer, Norsett and Wanner, Solving ODEs I, II.4 and for the continuous extension II.6.
 
 The main weights integrate the powers of the losses from the same stages, so that the power balance tests the integrator
 too.
@@ -9,15 +11,6 @@ the rollers they hardly move. So their coordinates are integrated in such a fram
 change of variables (Lawson 1967, for a linear part that is a rotation). The frame coincides with the fixed axes at the
 start of the step. At the time t of the step it has turned by phi, with tan(phi/2) = rate t/2: cosine, sine and speed of
 such a turn are rational.
-
-A pair is a method (``advance``) that also has ``limit``: h |eigenvalue| above which stability limits a step. There are two:
-
-- Dormand and Prince 1980: order 5(4), six right-hand sides a step; continuous extension after Hairer, Norsett and Wanner, II.6
-- Kutta 1901: the 3/8 rule with its embedded third order, four right-hand sides a step (the same, II.1); dense output by the
-  cubic through values and slopes at both ends, third-order accurate
-
-Until stability limits it, a right-hand side of Kutta's pair goes a quarter (decay) and three quarters (vibration) farther
-than one of Dormand and Prince. So it is the cheaper pair where stability limits the steps.
 """
 
 import math
@@ -26,61 +19,12 @@ from typing import NamedTuple
 import numpy as np
 
 from rbdyn.compiled.elementary import fma
-from rbdyn.compiled.kernel import kernel, law, routine
+from rbdyn.compiled.kernel import kernel, routine
 from rbdyn.dynamics.forces.equations import derivative, roller_count
 from rbdyn.dynamics.integrators import advance as laws
 from rbdyn.dynamics.integrators.advance import DERIVATIVES, EIGENVALUES, FRAME, LIMITED, TESTED
 
-
-@law
-def node(pair, s):
-    """Time of row ``s`` since the start of the step, over its size."""
-
-
-@law
-def weight(pair, s, row):
-    """Weight of a row in the state at which row ``s`` is evaluated; the last row makes the new state."""
-
-
-@law
-def stage_state(pair, s, y, k, h, state):
-    """State at which row ``s`` is evaluated. One pass a stage: rows of weight zero may hold anything."""
-
-
-@kernel
-def early_stage_state(s, y, k, w0, w1, w2, state):
-    """``stage_state`` of rows 0 to 3 by the weights of rows 0 to 2, times the step."""
-    n = y.size
-    if s == 0:
-        for i in range(n):
-            state[i] = y[i]
-    elif s == 1:
-        for i in range(n):
-            state[i] = fma(w0, k[0, i], y[i])
-    elif s == 2:
-        for i in range(n):
-            state[i] = fma(w1, k[1, i], fma(w0, k[0, i], y[i]))
-    else:
-        for i in range(n):
-            state[i] = fma(w2, k[2, i], fma(w1, k[1, i], fma(w0, k[0, i], y[i])))
-
-
-@law
-def mean_rate(pair, rows, i):
-    """Mean over the step of rate ``i``, by the main weights."""
-
-
-@law
-def rate_error(pair, k, i):
-    """Main less embedded mean of rate ``i``."""
-
-
-@law
-def quartic_rate(pair, k, i):
-    """Coefficient of theta^2 (1 - theta)^2 in the dense output, added to the cubic through values and slopes at both ends."""
-
-
-PRINCE_WEIGHTS = np.array(
+WEIGHTS = np.array(
     [
         [0, 0, 0, 0, 0, 0],
         [1 / 5, 0, 0, 0, 0, 0],
@@ -91,7 +35,7 @@ PRINCE_WEIGHTS = np.array(
         [35 / 384, 0, 500 / 1113, 125 / 192, -2187 / 6784, 11 / 84],
     ]
 )
-PRINCE_NODES = np.array([0, 1 / 5, 3 / 10, 4 / 5, 8 / 9, 1, 1])
+NODES = np.array([0, 1 / 5, 3 / 10, 4 / 5, 8 / 9, 1, 1])
 B1, B3, B4, B5, B6 = 35 / 384, 500 / 1113, 125 / 192, -2187 / 6784, 11 / 84
 E1, E3, E4, E5, E6, E7 = 71 / 57600, -71 / 16695, 71 / 1920, -17253 / 339200, 22 / 525, -1 / 40
 D1, D3, D4 = -12715105075 / 11282082432, 87487479700 / 32700410799, -10690763975 / 1880347072
@@ -99,7 +43,7 @@ D5, D6, D7 = 701980252875 / 199316789632, -1453857185 / 822651844, 69997945 / 29
 
 
 class DormandPrince(NamedTuple):
-    """The pair of order 5(4), six right-hand sides a step; fields as in ``advance``."""
+    """Fields as in ``advance``; ``limit``: h |eigenvalue| above which stability limits a step."""
 
     last: int = 6
     free: int = 7
@@ -110,44 +54,48 @@ class DormandPrince(NamedTuple):
     limit: float = 2.0
 
 
-@node.body(DormandPrince)
-def _(pair, s):
-    return PRINCE_NODES[s]
-
-
-@weight.body(DormandPrince)
-def _(pair, s, row):
-    return PRINCE_WEIGHTS[s, row]
-
-
-@mean_rate.body(DormandPrince)
-def _(pair, rows, i):
+@kernel
+def mean_rate(rows, i):
+    """Mean over the step of rate ``i``, by the main weights."""
     return B1 * rows[0, i] + B3 * rows[2, i] + B4 * rows[3, i] + B5 * rows[4, i] + B6 * rows[5, i]
 
 
-@rate_error.body(DormandPrince)
-def _(pair, k, i):
+@kernel
+def rate_error(k, i):
+    """Main less embedded mean of rate ``i``."""
     return E1 * k[0, i] + E3 * k[2, i] + E4 * k[3, i] + E5 * k[4, i] + E6 * k[5, i] + E7 * k[6, i]
 
 
-@quartic_rate.body(DormandPrince)
-def _(pair, k, i):
+@kernel
+def quartic_rate(k, i):
+    """Coefficient of theta^2 (1 - theta)^2 in the dense output, added to the cubic through values and slopes at both ends."""
     return D1 * k[0, i] + D3 * k[2, i] + D4 * k[3, i] + D5 * k[4, i] + D6 * k[5, i] + D7 * k[6, i]
 
 
-@stage_state.body(DormandPrince)
-def _(pair, s, y, k, h, state):
+@kernel
+def stage_state(s, y, k, h, state):
+    """State at which row ``s`` is evaluated. One pass a stage: rows of weight zero may hold anything."""
     n = y.size
     w0, w1, w2, w3, w4, w5 = (
-        h * PRINCE_WEIGHTS[s, 0],
-        h * PRINCE_WEIGHTS[s, 1],
-        h * PRINCE_WEIGHTS[s, 2],
-        h * PRINCE_WEIGHTS[s, 3],
-        h * PRINCE_WEIGHTS[s, 4],
-        h * PRINCE_WEIGHTS[s, 5],
+        h * WEIGHTS[s, 0],
+        h * WEIGHTS[s, 1],
+        h * WEIGHTS[s, 2],
+        h * WEIGHTS[s, 3],
+        h * WEIGHTS[s, 4],
+        h * WEIGHTS[s, 5],
     )
-    if s <= 3:
-        early_stage_state(s, y, k, w0, w1, w2, state)
+    if s == 0:
+        for i in range(n):
+            state[i] = y[i]
+    elif s == 1:
+        for i in range(n):
+            state[i] = fma(w0, k[0, i], y[i])
+    elif s == 2:
+        for i in range(n):
+            state[i] = fma(w1, k[1, i], fma(w0, k[0, i], y[i]))
+    elif s == 3:
+        for i in range(n):
+            state[i] = fma(w2, k[2, i], fma(w1, k[1, i], fma(w0, k[0, i], y[i])))
     elif s == 4:
         for i in range(n):
             state[i] = fma(w3, k[3, i], fma(w2, k[2, i], fma(w1, k[1, i], fma(w0, k[0, i], y[i]))))
@@ -159,65 +107,6 @@ def _(pair, s, y, k, h, state):
         for i in range(n):
             early = fma(w3, k[3, i], fma(w2, k[2, i], w0 * k[0, i]))
             state[i] = y[i] + fma(w5, k[5, i], fma(w4, k[4, i], early))
-
-
-KUTTA_WEIGHTS = np.array(
-    [[0, 0, 0, 0], [1 / 3, 0, 0, 0], [-1 / 3, 1, 0, 0], [1, -1, 1, 0], [1 / 8, 3 / 8, 3 / 8, 1 / 8]]
-)
-KUTTA_NODES = np.array([0, 1 / 3, 2 / 3, 1, 1])
-KUTTA_B1, KUTTA_B2, KUTTA_B3, KUTTA_B4 = 1 / 8, 3 / 8, 3 / 8, 1 / 8
-KUTTA_E1, KUTTA_E2, KUTTA_E3, KUTTA_E4, KUTTA_E5 = 1 / 24, -1 / 8, 1 / 8, 1 / 8, -1 / 6
-
-
-class Kutta(NamedTuple):
-    """Kutta's pair, four right-hand sides a step. The PI controller is Gustafsson's: 0.7 and 0.4 over the order of the error.
-
-    With the milder one of the other pair every sixth step that stability limits is refused.
-    """
-
-    last: int = 4
-    free: int = 5
-    exponent: float = 0.7 / 4
-    beta: float = 0.4 / 4
-    rejected: float = 1 / 4
-    # Stable up to 2.8 both for decay and for vibration.
-    limit: float = 2.3
-
-
-@node.body(Kutta)
-def _(pair, s):
-    return KUTTA_NODES[s]
-
-
-@weight.body(Kutta)
-def _(pair, s, row):
-    return KUTTA_WEIGHTS[s, row]
-
-
-@stage_state.body(Kutta)
-def _(pair, s, y, k, h, state):
-    n = y.size
-    w0, w1, w2, w3 = h * KUTTA_WEIGHTS[s, 0], h * KUTTA_WEIGHTS[s, 1], h * KUTTA_WEIGHTS[s, 2], h * KUTTA_WEIGHTS[s, 3]
-    if s <= 3:
-        early_stage_state(s, y, k, w0, w1, w2, state)
-    else:
-        for i in range(n):
-            state[i] = fma(w3, k[3, i], fma(w2, k[2, i], fma(w1, k[1, i], fma(w0, k[0, i], y[i]))))
-
-
-@mean_rate.body(Kutta)
-def _(pair, rows, i):
-    return KUTTA_B1 * rows[0, i] + KUTTA_B2 * rows[1, i] + KUTTA_B3 * rows[2, i] + KUTTA_B4 * rows[3, i]
-
-
-@rate_error.body(Kutta)
-def _(pair, k, i):
-    return KUTTA_E1 * k[0, i] + KUTTA_E2 * k[1, i] + KUTTA_E3 * k[2, i] + KUTTA_E4 * k[3, i] + KUTTA_E5 * k[4, i]
-
-
-@quartic_rate.body(Kutta)
-def _(pair, k, i):
-    return 0.0
 
 
 class Turn(NamedTuple):
@@ -286,9 +175,6 @@ def rates_to_fixed_axes(turn, z, y, row, dy):
             dy[row, i], dy[row, z + i] = along - turn.speed * y[z + i], across + turn.speed * y[i]
 
 
-PAIRS = (DormandPrince, Kutta)
-
-
 @kernel
 def begin_step(z, y, k):
     """Rate of the frame [rad/s] of the step from ``y``, whose first stage, given in fixed axes, is turned into it."""
@@ -297,7 +183,7 @@ def begin_step(z, y, k):
     return rate
 
 
-@laws.begin.body(*PAIRS)
+@laws.begin.body(DormandPrince)
 def _(pair, bearing, y, k, power, loads, scratch, clock, counts):
     if counts[DERIVATIVES] == 0:
         for i in range(y.size):
@@ -307,69 +193,69 @@ def _(pair, bearing, y, k, power, loads, scratch, clock, counts):
     return -1
 
 
-@laws.trial_step.body(*PAIRS)
+@laws.trial_step.body(DormandPrince)
 def _(pair, refused, bearing, y, k, stage, power, loads, scratch, clock, counts, h):
     # One loop of a length that the compiler does not know: unrolled, the derivatives would overflow the instruction cache.
     # Only the very first step computes its first row.
     z, rate = roller_count(bearing), clock[FRAME]
     first = 0 if counts[DERIVATIVES] == 0 else 1
     for s in range(first, pair.last + 1):
-        turn = turn_of(rate, node(pair, s) * h)
-        stage_state(pair, s, y, k, h, stage)
+        turn = turn_of(rate, NODES[s] * h)
+        stage_state(s, y, k, h, stage)
         to_fixed_axes(turn, z, stage)
         derivative(bearing, stage, s, k, power, loads, scratch)
         rates_to_frame(turn, z, stage, s, k)
     counts[DERIVATIVES] += pair.last + 1 - first
 
 
-@laws.error_norm.body(*PAIRS)
+@laws.error_norm.body(DormandPrince)
 def _(pair, k, h, inverse_tolerance):
     # Squares in vectors, into a row that is free.
     n, squares = inverse_tolerance.size, pair.free
     for i in range(n):
-        e = rate_error(pair, k, i) * inverse_tolerance[i]
+        e = rate_error(k, i) * inverse_tolerance[i]
         k[squares, i] = e * e
     return h * math.sqrt(laws.row_sum(k, squares, n))
 
 
-@laws.step_error.body(*PAIRS)
+@laws.step_error.body(DormandPrince)
 def _(pair, k, h, i):
-    return h * rate_error(pair, k, i)
+    return h * rate_error(k, i)
 
 
-@laws.interpolate.body(*PAIRS)
+@laws.interpolate.body(DormandPrince)
 def _(pair, y, end, k, h, theta, i):
     # To the order of the pair less one; rollers' in the frame of the step.
-    difference = h * mean_rate(pair, k, i)
+    difference = h * mean_rate(k, i)
     slope = h * k[0, i] - difference
     curve = difference - h * k[pair.last, i] - slope
-    quartic = h * quartic_rate(pair, k, i)
+    quartic = h * quartic_rate(k, i)
     left = 1.0 - theta
     return y[i] + theta * (difference + left * (slope + theta * (curve + left * quartic)))
 
 
-@laws.end_step.body(*PAIRS)
+@laws.end_step.body(DormandPrince)
 def _(pair, bearing, stage, k, power, loads, scratch, counts):
     pass
 
 
-@laws.work_done.body(*PAIRS)
+@laws.work_done.body(DormandPrince)
 def _(pair, power, h, p):
-    return h * mean_rate(pair, power, p)
+    return h * mean_rate(power, p)
 
 
-@laws.to_fixed_axes_at.body(*PAIRS)
+@laws.to_fixed_axes_at.body(DormandPrince)
 def _(pair, clock, time, z, y):
     to_fixed_axes(turn_of(clock[FRAME], time), z, y)
 
 
-@laws.next_frame.body(*PAIRS)
+@laws.next_frame.body(DormandPrince)
 def _(pair, clock, h, z, y, k):
     rates_to_fixed_axes(turn_of(clock[FRAME], h), z, y, 0, k)
     clock[FRAME] = begin_step(z, y, k)
 
 
-@laws.test_stiffness.body(*PAIRS)
+@laws.test_stiffness.body(DormandPrince)
 def _(pair, k, stiffness, h, inverse_tolerance):
     compare_last_stages(pair, k, stiffness, h, inverse_tolerance)
 
@@ -385,7 +271,7 @@ def compare_last_stages(pair, k, stiffness, h, inverse_tolerance):
     for i in range(inverse_tolerance.size):
         k[way, i] = 0.0
     for s in range(last):
-        change = weight(pair, last, s) - weight(pair, last - 1, s)
+        change = WEIGHTS[last, s] - WEIGHTS[last - 1, s]
         if change != 0.0:
             for i in range(inverse_tolerance.size):
                 k[way, i] += change * k[s, i]

@@ -23,15 +23,14 @@ from rbdyn.scene import Scene
 
 # Largest scale of errors of contact speeds, as a share of the speed of the faster race. At its limit of stability the explicit
 # method leaves the whole tolerance in every contact in every step, and contacts dissipate it. In a slow bearing that must
-# stay small compared with the rolling loss. The implicit method damps it. With 0.05 the power balance of verlet misses 0.05 % at
-# 2000 rpm in the bearing of Chen et al. 2022 and 2 % under twenty times its load, with 0.01 0.001 and 0.1 % for 4 % more steps.
-SPEED_SHARES = {"rk45": 0.05, "rk43": 0.05, "verlet": 0.01, "rosenbrock": 1.0}
+# stay small compared with the rolling loss. The implicit method damps it. With 0.05 the power balance of verlet misses 0.06 % at
+# 2000 rpm in the bearing of Chen et al. 2022 and 2 % under twenty times its load, with 0.02 0.007 and 0.4 % for 1 to 3 % more steps.
+SPEED_SHARES = {"rk45": 0.05, "verlet": 0.02, "rosenbrock": 1.0}
 # Tolerance of the speeds of the cage over that of a contact speed. Only impacts change them, in two or three explicit steps
 # each, which damp an impact where the races alone set the steps. With it impact and whirl of the bearing of Chen et al. 2022
-# are off by -0.14 +- 0.12 and -0.1 +- 0.4 % in 1890 right-hand sides of rk43 a turn, without it by -0.3 and -0.9 % in 1490.
-# Verlet has the same errors, -0.1 +- 0.2 and -0.5 +- 0.8 %, in 890 right-hand sides.
+# are off by -0.1 +- 0.2 and -0.5 +- 0.8 % in 890 right-hand sides of verlet a turn.
 # The implicit method damps less: whirl goes from +0.6 +- 1.1 to +0.2 +- 0.8 % for a hundredth more right-hand sides.
-CAGE_SHARES = {"rk45": 0.01, "rk43": 0.01, "verlet": 0.01, "rosenbrock": 0.1}
+CAGE_SHARES = {"rk45": 0.01, "verlet": 0.01, "rosenbrock": 0.1}
 # Centrifugal force over the mean load share, below which rollers outside the load zone jump.
 LIGHT = 0.05
 # Scale of errors of a traction coefficient: a fifth of a usual peak.
@@ -145,7 +144,7 @@ def absolute_tolerance(scene: Scene, bearing: RollerBearing, rtol: float, method
     - The spin of a roller counts by its slip. That is at most the scale of the traction curve at the load of the most loaded
       roller (Stribeck). Traction coefficients that are states have a scale of their own.
     - Speeds of the cage count by the method's share of a contact speed.
-    - The clock has an infinite tolerance, since the method integrates it exactly.
+    - The clock has an infinite tolerance, since methods integrate it exactly, but for kinks of a schedule within a step.
     """
     scale, state = scales(scene), layout_of(scene)
     speed = min(scale.speed, SPEED_SHARES[method] * fastest_surface(scene))
