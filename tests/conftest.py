@@ -85,8 +85,8 @@ EVERYTHING = (
 # Files that take longest begin, so that no process works on one of them while the other has nothing left; the first of them
 # compiles most, the second nothing.
 DEAREST = (
-    "test_study_heat", "test_accuracy", "test_adaptive", "test_duty_starts", "test_uncertainty", "test_streams", "test_hot_balls",
-    "test_start",
+    "test_accuracy_of_new_scenes", "test_own_bearing", "test_study_heat", "test_accuracy", "test_adaptive", "test_duty_starts",
+    "test_uncertainty", "test_streams", "test_hot_balls", "test_start",
     "test_map_and_options", "test_equations", "test_rolling_resistance", "test_study_survival", "test_study_adaptive",
     "test_golden", "test_rosenbrock", "test_surroundings", "test_runge_kutta", "test_study", "test_calibrate",
     "test_unknown_calibration", "test_unknown_worth", "test_ball_sweep", "test_ball_solvers", "test_manual",
