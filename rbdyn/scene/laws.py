@@ -215,8 +215,8 @@ class Numerics(Consistent, Sparse):
     rosenbrock is cheaper."""
     rtol: Annotated[float, Field(ge=1e-13, le=0.1)] = 1e-2
     """Relative tolerance of a step: the error in approach and speed of a raceway contact at its mean load share. Effect:
-    errors at 1e-2 for the bearing of Chen et al. 2022 are impact -0.05 +- 0.12 %, whirl +0.1 +- 0.4 %, loss 0.000 +- 0.008 %.
-    At 1e-1 they are -0.6, -4.0 and +0.025 % (compared with rk45 at 1e-4)."""
+    errors at 1e-2 for the bearing of Chen et al. 2022 are impact +0.1 +- 0.4 %, whirl +0.2 +- 0.9 %, loss -0.01 +- 0.02 %.
+    At 1e-1 they are -0.9, -4.0 and +0.09 % (compared with verlet at 1e-4)."""
     turns: Annotated[float, Field(gt=0.0, le=1e6)] = 100
     """Shaft turns that are counted, after discard_turns."""
     discard_turns: Annotated[float, Field(ge=0.0, le=1e6)] | Literal["auto"] = 20.0
