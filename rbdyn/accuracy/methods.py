@@ -79,10 +79,15 @@ class Method(NamedTuple):
         return f"{steps_of(stretch.duration, fixed_step(stretch.scene, setting)) / stretch.turns:.0f} steps a turn"
 
 
-def ready_ours(stretch: Stretch, rtol: float) -> Callable[[], Arrived]:
-    """As in a simulation, with its tally: works, largest loads, whirl."""
-    limits = {"turns": stretch.turns, "discard_turns": 0.0, "step_budget_per_turn": BUDGET_PER_TURN, "method": "rk45"}
-    return _over(stretch, Run(with_numerics(stretch.scene, **limits), stretch.bearing, 0, rtol, Stop()))
+def by_simulation(method: str) -> Callable[..., Callable[[], Arrived]]:
+    """``ready`` of a method as in a simulation, with its tally: works, largest loads, whirl."""
+
+    def ready(stretch: Stretch, rtol: float) -> Callable[[], Arrived]:
+        limits = {"turns": stretch.turns, "discard_turns": 0.0, "step_budget_per_turn": BUDGET_PER_TURN}
+        scene = with_numerics(stretch.scene, method=method, **limits)
+        return _over(stretch, Run(scene, stretch.bearing, 0, rtol, Stop()))
+
+    return ready
 
 
 def _over(stretch: Stretch, run: Run) -> Callable[[], Arrived]:
@@ -215,12 +220,13 @@ def _halved(first: float, count: int) -> tuple[float, ...]:
     return tuple(first * 0.5**k for k in range(count))
 
 
-OURS = Method("rbdyn RK45", True, (1e-1, 3e-2, 1e-2, *_decades(3, 10)), ready_ours)
+OURS = Method("rbdyn RK45", True, (1e-1, 3e-2, 1e-2, *_decades(3, 10)), by_simulation("rk45"))
+OUR_VERLET = Method("rbdyn Verlet", True, (1e-1, 3e-2, 1e-2, *_decades(3, 7)), by_simulation("verlet"))
 RUNGE_KUTTA_4 = Method("RK4, fixed step", False, _halved(4.0, 9), by_fixed_step(verlet=False))
-VELOCITY_VERLET = Method("velocity Verlet", False, _halved(4.0, 11), by_fixed_step(verlet=True))
+VELOCITY_VERLET = Method("Verlet, fixed step", False, _halved(4.0, 11), by_fixed_step(verlet=True))
 SCIPY_RK45 = Method("SciPy RK45", True, _decades(0, 9), by_scipy("RK45"))
 DOP853 = Method("SciPy DOP853", True, _decades(0, 10), by_scipy("DOP853"))
-COMPILED = (OURS, RUNGE_KUTTA_4, VELOCITY_VERLET)
+COMPILED = (OURS, OUR_VERLET, RUNGE_KUTTA_4, VELOCITY_VERLET)
 METHODS = (
     *COMPILED,
     SCIPY_RK45,

@@ -109,7 +109,7 @@ COLOURS = {"impact_force_N": VERMILION, "whirl_deviation_ratio": ORANGE, "power_
 NAMES = {"impact_force_N": "impact force", "whirl_deviation_ratio": "whirl ratio", "power_loss_W": "power loss"}
 # Ours is black; the others share a colour a family and differ by mark.
 MARKS = ("o", "s", "D", "^", "v", "P", "X", "<", ">", "h")
-METHOD_COLOURS = ("black", GREEN, SKY, BLUE, PURPLE, VERMILION, ORANGE, "#8C510A", GREY, "#7A6BB0")
+METHOD_COLOURS = ("black", GREEN, SKY, BLUE, PURPLE, VERMILION, ORANGE, "#8C510A", GREY, "#7A6BB0", "#B8860B")
 SMALLEST_BIAS = 1e-6
 
 Points = Sequence[tuple[float, float]]

@@ -67,7 +67,7 @@ def test_unit_default_study_has_statistics_and_trajectories(outer, tmp_path, dra
     assert {"format", "status", "rows", "conclusion", "turns", "replicates", "machine", "versions"} <= set(saved)
     assert saved["format"] == "rbdyn.accuracy/1" and len(saved["rows"]) == 2
     methods = {row["method"] for row in saved["trajectory"]["rows"]}
-    assert methods == {"rbdyn RK45", "RK4, fixed step", "velocity Verlet"}
+    assert methods == {"rbdyn RK45", "rbdyn Verlet", "RK4, fixed step", "Verlet, fixed step"}
 
 
 def test_rate_load_of_slices_converges(make_scene):
