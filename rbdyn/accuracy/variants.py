@@ -26,8 +26,7 @@ from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.figures import IMPACT_FORCE, POWER_LOSS, WHIRL_DEVIATION_RATIO
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.recording import run_replicate
-from rbdyn.dynamics.run import largest_eigenvalue, prepare
-from rbdyn.dynamics.statistics.metrics import held_by_stability
+from rbdyn.dynamics.run import held_by_stability, largest_eigenvalue, prepare
 from rbdyn.scene import Scene
 
 COST_TURNS, COST_DISCARDED = 10, 2

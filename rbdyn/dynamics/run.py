@@ -23,7 +23,7 @@ from rbdyn.dynamics.forces.state import CAGE_X, INNER_ANGLE, OUTER_ANGLE, RING_X
 from rbdyn.dynamics.integrators import advance
 from rbdyn.dynamics.integrators.runge_kutta import DormandPrince
 from rbdyn.dynamics.parameters.state import absolute_tolerance, increments, layout_of, scales, start_state, wall_of
-from rbdyn.dynamics.statistics.metrics import STIFF_SHARE, held_by_stability
+from rbdyn.dynamics.statistics.metrics import STIFF_SHARE
 from rbdyn.dynamics.statistics.replicate import Replicate
 from rbdyn.scene import Scene
 
@@ -283,6 +283,11 @@ def _copy(carry: advance.Carry) -> advance.Carry:
     """A copy that shares only the work space."""
     data: dict[str, Any] = {key: part.copy() for key, part in carry._asdict().items() if isinstance(part, np.ndarray)}
     return carry._replace(**data)
+
+
+def held_by_stability(stiffness: Sequence[float] | np.ndarray) -> float:
+    """Share of the explicit steps tested that stability limited, not accuracy."""
+    return float(stiffness[advance.LIMITED] / stiffness[advance.TESTED]) if stiffness[advance.TESTED] > 0.0 else 0.0
 
 
 def largest_eigenvalue(stiffness: Sequence[float] | np.ndarray) -> float:

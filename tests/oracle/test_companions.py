@@ -106,18 +106,19 @@ def test_unit_companions_follow_the_steps(make_scene, outer):
     for method in DAMPING_SCALE.keys() - {"verlet"}:
         limit = longest_step(light, NOTABLE_DAMPING * light.damping, method)
         assert numerical_damping(light, limit, method) == pytest.approx(NOTABLE_DAMPING * light.damping)
-        found = companions_of(slow, runs_with(slow, 1.05 * limit, method))
+        found = companions_of(slow, runs_with(slow, 1.05 * limit, method), 1.0)
         assert found.rtol == pytest.approx(1e-3) and found.method == method and found.share == pytest.approx(10.0 / 9.0)
         left = numerical_damping(light, found.longest_step, method)
         assert left == pytest.approx(
             resolved_damping(1.05**5 * NOTABLE_DAMPING * light.damping, light.damping), rel=1e-4
         )
-        assert companions_of(slow, runs_with(slow, 0.95 * limit, method)) == usual_companions(slow)
+        assert companions_of(slow, runs_with(slow, 0.95 * limit, method), 1.0) == usual_companions(slow)
     resolved = Companions(0.01, "verlet", pytest.approx(0.5e-5), 1.0)
     for held, plan in ((0.4, usual_companions(slow)), (0.6, resolved)):
-        runs = [replace(run, stiffness=np.array([100.0, 100.0 * held, 0.0])) for run in runs_with(slow, 1e-5, "verlet")]
-        assert companions_of(slow, runs) == plan
-    assert companions_of(outer, runs_with(outer, 1.0)) == usual_companions(outer)
+        assert companions_of(slow, runs_with(slow, 1e-5, "verlet"), held) == plan
+    elastic = make_scene(*SLOW, "traction.elasticity=true")
+    assert companions_of(elastic, runs_with(elastic, 1e-5, "verlet"), 0.6) == usual_companions(elastic)
+    assert companions_of(outer, runs_with(outer, 1.0), 1.0) == usual_companions(outer)
     assert usual_companions(slow).longest_step == math.inf
 
 
@@ -129,15 +130,15 @@ def test_unit_companions_follow_the_method_that_damps_most(make_scene):
         longest_step(light, share * light.damping, "rk45") for share in (2.0 * NOTABLE_DAMPING, 0.1 * NOTABLE_DAMPING)
     )
     runs = [*runs_with(slow, long, "rk45"), *runs_with(slow, short, "rosenbrock")]
-    assert companions_of(slow, runs).method == companions_of(slow, runs[::-1]).method == "rk45"
-    assert companions_of(slow, runs[2:]) == usual_companions(slow)
+    assert companions_of(slow, runs, 1.0).method == companions_of(slow, runs[::-1], 1.0).method == "rk45"
+    assert companions_of(slow, runs[2:], 1.0) == usual_companions(slow)
 
 
 def test_unit_undamped_races_ask_for_finite_steps(make_scene):
     """Unit: where no law damps a light contact, companions still have a step."""
     slow = make_scene(*SLOW, "model.race_damping=off")
     light = light_contact(slow)
-    found = companions_of(slow, runs_with(slow, 1e-5))
+    found = companions_of(slow, runs_with(slow, 1e-5), 1.0)
     left = numerical_damping(light, found.longest_step, "rk45")
     assert left == pytest.approx(resolved_damping(MOST_DAMPING, LEAST_DAMPING), rel=1e-4)
 

@@ -20,10 +20,9 @@ from rbdyn.dynamics.integrators.rosenbrock import arrow_matrix, differences_of, 
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.parameters.state import absolute_tolerance, increments, layout_of, scales, slip_scale
 from rbdyn.dynamics.recording import run_replicate
-from rbdyn.dynamics.run import largest_eigenvalue
+from rbdyn.dynamics.run import held_by_stability, largest_eigenvalue
 from rbdyn.dynamics.simulate import simulate
 from rbdyn.dynamics.statistics.batch_means import student_half_width
-from rbdyn.dynamics.statistics.metrics import held_by_stability
 from rbdyn.losses import POWERS, SHAFT
 
 STEEP = ("traction.constants=[-0.05,5.0,100.0,0.05]",)

@@ -48,7 +48,6 @@ import numpy as np
 
 from rbdyn.base.arrays import Array, Whole
 from rbdyn.base.notes import Note, Notes
-from rbdyn.dynamics.integrators.advance import LIMITED, TESTED
 from rbdyn.dynamics.parameters.state import LightContact, light_contact
 from rbdyn.dynamics.statistics.batch_means import Estimate, estimate, student_factor
 from rbdyn.dynamics.statistics.replicate import Replicate, Statistic
@@ -179,13 +178,12 @@ def usual_companions(scene: Scene) -> Companions:
     return Companions(companion_tolerance(numerics.rtol), numerics.method, math.inf, bias_scale(numerics.rtol))
 
 
-def companions_of(scene: Scene, runs: Sequence[Replicate]) -> Companions:
-    """Companions of these runs, by the steps that they took."""
+def companions_of(scene: Scene, runs: Sequence[Replicate], held: float) -> Companions:
+    """Companions of these runs, by the steps that they took, of which stability limited the share ``held``."""
     light = light_contact(scene)
     if light is None:
         return usual_companions(scene)
     if all(run.method == "verlet" for run in runs):
-        held = held_by_stability(np.sum([run.stiffness for run in runs], axis=0))
         if scene.traction.elasticity or held < STIFF_SHARE:
             return usual_companions(scene)
         return Companions(scene.numerics.rtol, "verlet", 0.5 * mean_step(runs, "verlet"), 1.0)
@@ -197,11 +195,6 @@ def companions_of(scene: Scene, runs: Sequence[Replicate]) -> Companions:
         return usual_companions(scene)
     step = longest_step(light, resolved_damping(damping, race), method)
     return Companions(scene.numerics.rtol / FACTOR, method, step, FACTOR / (FACTOR - 1.0))
-
-
-def held_by_stability(stiffness: Sequence[float] | np.ndarray) -> float:
-    """Share of the explicit steps tested that stability limited, not accuracy."""
-    return float(stiffness[LIMITED] / stiffness[TESTED]) if stiffness[TESTED] > 0.0 else 0.0
 
 
 def resolved_damping(damping: float, race: float) -> float:
