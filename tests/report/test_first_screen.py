@@ -357,6 +357,6 @@ def test_the_example_study_has_a_short_first_screen(tmp_path):
     assert text.startswith("All 4 responses improve and every limit is met. No danger found; ")
     assert all(line in text for line in said.splitlines()) and len(words(said)) <= 210
     assert {gain["verdict"] for gain in answer["gains"].values()} == {"better"}
-    assert answer["gains"]["pocket_impact_power_W"]["percent"] == pytest.approx(26.0, abs=2.0)
+    assert answer["gains"]["pocket_impact_power_W"]["percent"] == pytest.approx(28.0, abs=2.0)
     assert text.count("(held 16/16)") == 2
     check_warnings(text)
