@@ -74,8 +74,9 @@ def inlet_heating(relative_pressure: Any, oil: Oil, entrainment_speed: Any, slip
     heating = oil.viscosity_slope * entrainment_speed**2 / oil.conductivity
     slide_roll = np.abs(slip) / entrainment_speed
     weights = 13.2 * relative_pressure, 0.213 * (1.0 + 2.23 * slide_roll**0.83)
-    if np.all(_thermal_fall(heating, *weights) <= FALL):
-        return _thermal_fit(heating, *weights)
+    fitted, beyond = _thermal_fit(heating, *weights), _thermal_fall(heating, *weights) > FALL
+    if not np.any(beyond):
+        return fitted
     # The steepness grows with L, so halving the interval of its logarithm finds the end to round-off.
     low, high = np.zeros(np.broadcast(heating, *weights).shape), np.log1p(heating)
     for _ in range(HALVINGS):
@@ -83,11 +84,7 @@ def inlet_heating(relative_pressure: Any, oil: Oil, entrainment_speed: Any, slip
         steep = _thermal_fall(np.expm1(middle), *weights) > FALL
         low, high = np.where(steep, low, middle), np.where(steep, middle, high)
     end = np.expm1(low)
-    return np.where(
-        _thermal_fall(heating, *weights) > FALL,
-        _thermal_fit(end, *weights) * (end / heating) ** FALL,
-        _thermal_fit(heating, *weights),
-    )
+    return np.where(beyond, _thermal_fit(end, *weights) * (end / heating) ** FALL, fitted)
 
 
 def _thermal_fit(heating: Any, pressure: Any, slip: Any) -> Any:

@@ -115,7 +115,7 @@ class Run:
         self.control = self.control._replace(step_budget=max(self.control.step_budget, self._budget(turns)))
 
     def _budget(self, turns: float) -> int:
-        steps = alike(self.explicit, self.scene.numerics.step_budget_per_turn)
+        steps = steps_as_cheap(self.explicit, self.scene.numerics.step_budget_per_turn)
         return int(min(steps * math.ceil(turns), 2**62))
 
     def to(self, turns: float) -> None:
@@ -203,7 +203,7 @@ FEWEST_PER_TURN = 8000
 IMPLICIT_OVERHEAD = 3.0
 
 
-def alike(method: str, steps: int) -> int:
+def steps_as_cheap(method: str, steps: int) -> int:
     """Steps of a method that cost as much as so many ``steps`` of Dormand and Prince: six of Verlet are one."""
     return 6 * steps if method == "verlet" else steps
 
@@ -253,7 +253,7 @@ def cheaper_method(
     if scene.traction.elasticity:
         return pair, np.zeros(advance.STIFFNESS)
     trial_s = TRIAL_TURNS * scene.turn_s
-    short = control_by(pair)._replace(step_budget=alike(pair, TRIAL_STEPS))
+    short = control_by(pair)._replace(step_budget=steps_as_cheap(pair, TRIAL_STEPS))
     run, book = _copy(carry), advance.Tally(*(sums.copy() for sums in tally))
     run.clock[advance.TRACED] = math.inf
     status = advance.advance(bearing, short, run, book, trial_s, sample_step)
