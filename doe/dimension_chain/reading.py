@@ -12,6 +12,7 @@ from doe.dimension_chain.allocation import Allocation
 from doe.dimension_chain.closing import NoValueError, is_part, press_fit_factor, quotation, used_links
 from doe.dimension_chain.links import Chain, Link, coded_limits
 from rbdyn.base.faults import MethodError, Strict, read_toml, refuse, validated
+from rbdyn.base.words import all_of
 from rbdyn.properties.tolerances import LARGEST, position_limits
 
 
@@ -85,7 +86,7 @@ def _link_faults(link: Link, chain: Chain, used: bool) -> list[str]:
 def _function_faults(link: Link) -> list[str]:
     """Faults of a link that is a function, such as keys of a dimension."""
     kinds = [key for key in ("press_fit", "thermal_growth", "expression") if getattr(link, key) is not None]
-    sentences = [f"{' and '.join(kinds)} contradict; a link is one of them"] if len(kinds) > 1 else []
+    sentences = [f"{all_of(kinds)} contradict; a link is one of them"] if len(kinds) > 1 else []
     alien = [key for key in ("nominal_mm", "upper_mm", "lower_mm", "fit", "mean_mm", "cost") if getattr(link, key)]
     sentences += [f"{key} = {getattr(link, key)}: a link of kind {kinds[0]} has none; remove it" for key in alien]
     rise = link.thermal_growth

@@ -29,7 +29,7 @@ from doe.workflow.runs import Runs
 from rbdyn.base.arrays import Array, Whole, one_thread
 from rbdyn.base.faults import InputError, MethodError, RunError, refuse
 from rbdyn.base.records import Record
-from rbdyn.base.words import NORMAL, counted
+from rbdyn.base.words import NORMAL, all_of, counted
 
 SIGNIFICANT = 0.05
 # Share of the half range of the region within which points are twins, if the drawing has no resolution.
@@ -209,9 +209,9 @@ def advice(study: Problem) -> list[str]:
     if not lacking:
         return []
     design = len(study.design.coded)
-    where = "every response" if len(lacking) == len(study.surfaces) > 1 else ", ".join(lacking)
+    where = "every response" if len(lacking) == len(study.surfaces) > 1 else all_of(lacking)
     return [
-        f"the predicted front is biased by lack of fit in {where}. Use --adaptive "
+        f"The predicted front is biased by lack of fit in {where}. Use --adaptive "
         f"({counted(max(study.file.adaptive.budget - design, 0), 'more run')})"
     ]
 

@@ -25,6 +25,7 @@ from doe.workflow.problem import Problem
 from doe.workflow.surfaces import Simulated, draw_all, drawn_responses, predict_all, predict_draws, quadratics
 from rbdyn.base.arrays import Array, Rows, one_thread
 from rbdyn.base.faults import InputError, MethodError
+from rbdyn.base.words import all_of
 
 # Shares of the back-off from limits: the search takes the largest that any point keeps.
 SHARES = (1.0, 0.5, 0.25, 0.0)
@@ -202,7 +203,7 @@ def excess_words(study: Problem, violations: Array) -> str:
     """'impact_force_N <= 40 by 3.2' of the limits that are exceeded, by their excess (c,)."""
     # Where runs failed, the last of the violations is that of no limit.
     by_limit = zip(study.goals.limited, violations.tolist(), strict=False)
-    return " and ".join(
+    return all_of(
         f"{study.responses[index]} {sense} {limit:g} by {violation:.4g}"
         for (index, sense, limit), violation in by_limit
         if violation > 0.0

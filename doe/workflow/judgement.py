@@ -9,7 +9,7 @@ from doe.unknown.decision import GainChances, Interval, Verdict
 from doe.unknown.propagation import Share
 from rbdyn.base.notes import Notes
 from rbdyn.base.records import Record, outside_json, spread
-from rbdyn.base.words import counted, quantity, shown
+from rbdyn.base.words import all_of, counted, quantity, shown
 from rbdyn.scene.unknown import UnknownInput, is_number
 
 # Share of cases from which gains hold; least increase in the chance of the right choice that is listed.
@@ -141,7 +141,7 @@ def _of_front(robust: Robust) -> list[str]:
     pick, *others = front.confirmed
     best = max(others, key=lambda point: point.chances.all.value)
     lost = [quantity(name)[0] for name, q2 in front.q2.items() if q2 < EXPLAINED]
-    doubt = f"; the emulators predict little of {' and '.join(lost)}, so a better one may exist" if lost else ""
+    doubt = f"; the emulators predict little of {all_of(lost)}, so a better one may exist" if lost else ""
     if best.chances.all.value <= pick.chances.all.value:
         return [
             f"No simulated point of the robust front is better in all responses in more cases than the selected design{doubt}."
@@ -205,7 +205,7 @@ def _nothing(robust: Robust, decision: Decision) -> str:
 def _lost(robust: Robust) -> str:
     """The gains that the inputs hardly explain, so that no input can show as decisive."""
     lost = [quantity(name)[0] for name, share in robust.explained.items() if share < EXPLAINED]
-    return f"; the inputs explain less than half of the gain in {' and '.join(lost)}" if lost else ""
+    return f"; the inputs explain less than half of the gain in {all_of(lost)}" if lost else ""
 
 
 def _together(pair: Pair | None) -> str:
@@ -213,7 +213,7 @@ def _together(pair: Pair | None) -> str:
     if pair is None:
         return ""
     worth = Share(pair.worth, *pair.worth_interval).of_hundred
-    return f" Measuring {' and '.join(pair.keys)} together raises that chance by {worth} points."
+    return f" Measuring {all_of(pair.keys)} together raises that chance by {worth} points."
 
 
 def _points(decider: Decider) -> str:

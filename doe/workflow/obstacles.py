@@ -46,7 +46,7 @@ from doe.workflow.tolerances import PickTolerances
 from rbdyn.base.arrays import Array, Mask
 from rbdyn.base.notes import Note, Notes
 from rbdyn.base.records import Record, derived, finite
-from rbdyn.base.words import Notice, counted, improvement, quantity, shown, with_error
+from rbdyn.base.words import Notice, all_of, counted, improvement, quantity, shown, with_error
 
 # Steps beyond a bound, up to half the width of the region again, at which the surfaces are asked.
 STEPS = 20
@@ -168,7 +168,7 @@ class Obstacles(Record):
         if self.beyond:
             ways = "; or ".join(way.words for way in self.beyond)
             return f"The limits may be met beyond the region, extrapolated by the surfaces: {ways}. Widen the design there."
-        names = " and ".join(quantity(name)[0] for name in self.at_bounds)
+        names = all_of(quantity(name)[0] for name in self.at_bounds)
         bounds = "its bound" if len(self.at_bounds) == 1 else "their bounds"
         why = (
             f"Moving {names} beyond {bounds} by half the region's width does not meet the limits, by the extrapolated surfaces"
@@ -423,7 +423,7 @@ def _uncertain(study: Problem, rival: Confirmed, pick: Confirmed) -> str:
     goals = study.goals
     apart = np.abs(rival.values - pick.values) <= np.nan_to_num((rival.estimate - pick.estimate).half_width, nan=np.inf)
     names = [quantity(study.responses[index])[0] for index in goals.objectives if apart[index]]
-    return f" ({' and '.join(names)} only within the error)" if names else ""
+    return f" ({all_of(names)} only within the error)" if names else ""
 
 
 def _reason(forecast: Forecast, rival: Confirmed, pick: Confirmed) -> str:
@@ -452,7 +452,7 @@ def _losses(study: Problem, costs: Array, pick_costs: Array, worse: Mask, pick: 
     """'power loss 1.2 % more' of the responses in which a point is predicted worse than the pick."""
     goals = study.goals
     percent = 100.0 * (pick_costs - costs) / np.abs(pick.values[goals.objectives])
-    return " and ".join(
+    return all_of(
         f"{quantity(study.responses[index])[0]} {improvement(float(change), None, study.file.response[index].goal)}"
         for index, change, loss in zip(goals.objectives, percent, worse, strict=True)
         if loss

@@ -21,6 +21,7 @@ from doe.workflow.problem import Problem
 from rbdyn.base.arrays import Array
 from rbdyn.base.faults import InputError, MethodError
 from rbdyn.base.records import Record
+from rbdyn.base.words import all_of
 from rbdyn.properties.tolerances import STANDARD_TOLERANCES
 from rbdyn.scene import Scene
 from rbdyn.scene.uncertain import MARKING
@@ -165,7 +166,7 @@ def manufacture_of(group: ClearanceParts, step: float) -> Manufacture:
 
     def made(grade: str, half: float) -> Manufacture:
         width = 0.5 * sum(abs(part.coefficient) * table[grade] for part, table in widths) + rollers * half
-        sizes = " and ".join(f"{part.name} {1e3 * table[grade]:g} um" for part, table in widths)
+        sizes = all_of(f"{part.name} {1e3 * table[grade]:g} um" for part, table in widths)
         graded = "".join(f", {part.name} within {1e3 * half:g} um of nominal" for part in group.parts if part.graded)
         why = "" if grade == finer[0] else f"; {finer[0]} would be wider than a step"
         return Manufacture(round(width, DIGITS), half, f"{grade} (ISO 286-1): {sizes}{graded}{why}")
@@ -282,7 +283,7 @@ def grade_of_parts(parts: Iterable[ChainPart]) -> Grade | None:
     if not ladder or not all(words.values()):
         return None
     widths = {name: PartWidth(part.nominal_mm, part.tolerance_mm) for name, part in made.items()}
-    return Grade(" and ".join(sorted(ladder, key=ladder.__getitem__)), min(ladder.values()), widths)
+    return Grade(all_of(sorted(ladder, key=ladder.__getitem__)), min(ladder.values()), widths)
 
 
 def _of_scene(groups: Mapping[str, ClearanceParts], key: str, name: str, value: float) -> SharedTolerance | None:

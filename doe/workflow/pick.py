@@ -41,7 +41,7 @@ from doe.workflow.runs import EstimatedValue
 from doe.workflow.surfaces import CHUNK, jacobian, quadratics
 from rbdyn.base.arrays import Array, Whole
 from rbdyn.base.records import Record, finite
-from rbdyn.base.words import improvement, quantity, shown
+from rbdyn.base.words import all_of, improvement, quantity, shown
 
 # Student's t of more degrees of freedom is normal to all digits that count.
 LARGE_FREEDOM = 1e9
@@ -347,9 +347,7 @@ class Place(NamedTuple):
 
     def sentence(self, point: str) -> str:
         """Where the ``point`` of that name lies, in words; empty inside the region that the runs reach."""
-        ends = " and ".join(
-            f"the {side} bound of {name}, {shown(bound)}" for name, (side, bound) in self.bounds.items()
-        )
+        ends = all_of(f"the {side} bound of {name}, {shown(bound)}" for name, (side, bound) in self.bounds.items())
         if ends and self.beyond:
             return f"{point} lies at {ends}, and farther out than any run: the surfaces extrapolate there."
         if ends:

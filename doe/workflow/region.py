@@ -25,7 +25,7 @@ from doe.workflow.problem import Problem
 from rbdyn.base.arrays import Array
 from rbdyn.base.faults import InputError, RunError, refuse
 from rbdyn.base.notes import Note
-from rbdyn.base.words import counted, quantity
+from rbdyn.base.words import all_of, counted, quantity
 from rbdyn.mounting.cage import NEARLY_K, RunningClearance
 from rbdyn.result import SimulationResult
 from rbdyn.scene import DrawnScene, Scene
@@ -104,9 +104,7 @@ class Taken(NamedTuple):
         takes = "takes" if len(names) == 1 and names != ["fits"] else "take"
         risk = f"less than {1e6 * self.floor:.3g} um left would be nearly lost"
         risk += " and heat itself until it closes" if self.hotter else ""
-        return (
-            f"{' and '.join(names)} {takes} {1e3 * taken:.3f} mm of it, and {risk}" if taken > 0.0 and names else risk
-        )
+        return f"{all_of(names)} {takes} {1e3 * taken:.3f} mm of it, and {risk}" if taken > 0.0 and names else risk
 
 
 def region_that_runs(study: Problem, folder: Path, effort: Effort, kept: float = KEPT) -> Region:

@@ -15,7 +15,7 @@ from rbdyn.base.blocks import Detail, Paragraph, Table
 from rbdyn.base.faults import InputError, read_bytes
 from rbdyn.base.files import digest_of, version_of
 from rbdyn.base.records import Record
-from rbdyn.base.words import quantity
+from rbdyn.base.words import all_of, quantity
 
 # Digits of a SHA-256 that are shown.
 DIGITS = 12
@@ -154,7 +154,7 @@ def _loads(operation: Mapping[str, Any]) -> str:
     )
     words = [f"{_number(force)} N {name}" for force, name in zip(forces, DIRECTIONS, strict=True) if force]
     if any(operation.get("moment_Nm") or ()):
-        words.append("moments of " + " and ".join(_number(moment) for moment in operation["moment_Nm"]) + " N m")
+        words.append("moments of " + all_of(_number(moment) for moment in operation["moment_Nm"]) + " N m")
     if operation.get("rotating_load_N"):
         words.append(f"{_number(operation['rotating_load_N'])} N rotating")
     for key, unit in (("preload_N", "N"), ("preload_um", "µm")):

@@ -233,3 +233,9 @@ def duration(seconds: float) -> str:
 def any_of(words: Sequence[str]) -> str:
     """'a, b or c'."""
     return f"{', '.join(words[:-1])} or {words[-1]}" if words[1:] else words[0]
+
+
+def all_of(words: Iterable[str]) -> str:
+    """'a, b and c'; empty without words."""
+    *first, last = [*words] or [""]
+    return f"{', '.join(first)} and {last}" if first else last

@@ -9,6 +9,7 @@ from rbdyn.base.faults import InputError
 from rbdyn.base.html import REPORT_FILES
 from rbdyn.base.identity import identity_of
 from rbdyn.base.notes import status_notes
+from rbdyn.base.words import all_of
 from rbdyn.scene import BallScene, Scene, balls_only
 
 if TYPE_CHECKING:
@@ -102,7 +103,7 @@ def _requested(sweeps: list[str] | None, target_yield: float | None, studies: di
     requested = {name: value for name, value in studies.items() if value is not None}
     flags = [f"--{name.replace('_', '-')}" for name in (*(["sweep"] if sweeps else []), *requested)]
     if len(flags) > 1:
-        raise InputError(f"{' and '.join(flags)}: are studies of their own; choose one")
+        raise InputError(f"{all_of(flags)}: are studies of their own; choose one")
     if target_yield is not None and studies["race_limits"] is None:
         raise InputError(f"--yield {target_yield:g}: is a share of --race-limits; add that or leave it out")
     return requested

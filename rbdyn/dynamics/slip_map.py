@@ -18,7 +18,7 @@ from rbdyn.base.faults import MOST_VALUES, InputError, RunError, refuse
 from rbdyn.base.files import Checkpoint, code_version, run_key, versions
 from rbdyn.base.notes import Notes, status_of
 from rbdyn.base.records import OverPoints, Record, derived, keyed, nullable, spread
-from rbdyn.base.words import Notice, quantity
+from rbdyn.base.words import Notice, all_of, quantity
 from rbdyn.contact.hertz_line import ROLLERS, pressure_notes
 from rbdyn.dynamics.cage_verdict import verdict_of
 from rbdyn.dynamics.ensemble import Outcome, Pace, Reporter, Stop, in_turn, keys_of, log, plan_of, run_all, threads_of
@@ -63,7 +63,7 @@ class Point(Record):
     def place(self, keys: Iterable[str]) -> str:
         """Values of keys of the map, such as "24000 rpm and 1300 N"."""
         places = dict(zip(AXES, (self.inner_speed_rpm, self.radial_load_N), strict=True)) | (self.at or {})
-        return " and ".join(axis_value(key, places[key]) for key in keys)
+        return all_of(axis_value(key, places[key]) for key in keys)
 
 
 def axis_value(key: str, value: float) -> str:

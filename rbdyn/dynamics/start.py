@@ -19,7 +19,7 @@ from rbdyn.base.arrays import Array
 from rbdyn.base.faults import RPM, InputError, RunError
 from rbdyn.base.notes import Note, Notes, status_notes
 from rbdyn.base.records import finite
-from rbdyn.base.words import NORMAL
+from rbdyn.base.words import NORMAL, all_of
 from rbdyn.clearances import DIFFERENCE
 from rbdyn.dynamics.figures import POWER_LOSS
 from rbdyn.dynamics.parameters.heat import loss_levels, term_shares
@@ -480,7 +480,7 @@ def _columns(
 def _failure_notes(failures: Sequence[Failure]) -> Notes:
     if not failures:
         return ()
-    times = " and ".join(f"{failure.time:.3g} s" for failure in failures)
+    times = all_of(f"{failure.time:.3g} s" for failure in failures)
     sentence = (
         f"start: simulations after {times} failed, so that their neighbours give the heat there; {failures[0].reason}"
     )

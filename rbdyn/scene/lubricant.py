@@ -21,6 +21,7 @@ from rbdyn.base.faults import (
     Sparse,
 )
 from rbdyn.base.notes import Note, Notes
+from rbdyn.base.words import all_of
 from rbdyn.properties.materials import OILS, Oil, oil_at
 from rbdyn.properties.oils import BASE_OILS, GOLD_SPREAD, TURBINE_OILS, BaseOil, Fluid, Walther, grade_oil
 
@@ -352,7 +353,7 @@ class Traction(Consistent):
         fields = type(self).model_fields
         rivals = [key for key in ("mu_0", "mu_m", "mu_inf", "u_m_m_s") if getattr(self, key) != fields[key].default]
         if rivals:
-            others = " and ".join(f"traction.{name} = {getattr(self, name):g}" for name in rivals)
+            others = all_of(f"traction.{name} = {getattr(self, name):g}" for name in rivals)
             yield f"{key}: contradicts {others}; give the constants or the peak, not both"
         if c <= 0.0:
             yield f"{key}: the third, C, must be greater than 0; fix it"

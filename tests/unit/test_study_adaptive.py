@@ -269,7 +269,7 @@ def test_advice_where_surfaces_miss_more_than_noise():
     (sentence,) = advice(
         study.with_surfaces(fit_surfaces(study, type(runs)(runs.coded, runs.actual, bent, runs.errors)))
     )
-    assert sentence == "the predicted front is biased by lack of fit in every response. Use --adaptive (80 more runs)"
+    assert sentence == "The predicted front is biased by lack of fit in every response. Use --adaptive (80 more runs)"
     smooth = 5.0 + runs.coded @ np.ones((3, 3)) + np.random.default_rng(1).normal(0.0, 0.1, runs.values.shape)
     assert (
         advice(study.with_surfaces(fit_surfaces(study, type(runs)(runs.coded, runs.actual, smooth, runs.errors)))) == []

@@ -9,7 +9,7 @@ from conftest import EXAMPLE
 from instant_runs import instant_result
 
 from rbdyn.base.notes import Note
-from rbdyn.base.words import are, counted
+from rbdyn.base.words import all_of, are, counted
 from rbdyn.scene import Scene
 
 
@@ -41,3 +41,10 @@ def test_unit_result_of_one_note_counts_one_note():
     shown = repr(result) + result._repr_html_()
     assert "1 note" in shown and "1 replicate," in shown
     assert not re.search(r"\b1 (notes|replicates)", shown)
+
+
+@pytest.mark.parametrize(
+    ("names", "words"), [([], ""), (["a"], "a"), (["a", "b"], "a and b"), (["a", "b", "c"], "a, b and c")]
+)
+def test_unit_all_names_are_listed_with_commas_and_one_and(names: list[str], words: str) -> None:
+    assert all_of(iter(names)) == words

@@ -35,7 +35,7 @@ from doe.workflow.tolerances import FactorTolerance
 from rbdyn.base.blocks import Block, Column, Detail, Figures, Paragraph, Role, Section, Sheet, Table, Widget
 from rbdyn.base.identity import identity_line
 from rbdyn.base.notes import DANGER, of_level
-from rbdyn.base.words import chance, counted, label, quantity, range_ends, rounded_down, shown, with_error
+from rbdyn.base.words import all_of, chance, counted, label, quantity, range_ends, rounded_down, shown, with_error
 from rbdyn.clearances import CLEARANCES, other_ranges
 from rbdyn.result import TEMPERATURES
 
@@ -140,7 +140,7 @@ def good_news(summary: Summary) -> str:
     if not real:
         return "No response improves by more than its error."
     named = len(real) < 3
-    words = " and ".join(quantity(name)[0] for name in real) if named else f"{len(real)} of {count} responses"
+    words = all_of(quantity(name)[0] for name in real) if named else f"{len(real)} of {count} responses"
     subject = (
         f"All {count} responses improve"
         if len(real) == count > 1
@@ -180,7 +180,7 @@ def _edge(edge: Edge) -> Paragraph:
         for name, bound in edge.factors.items()
     ]
     if bounds:
-        return Paragraph(f"The selected design is near {' and '.join(bounds)}: try a wider region.", "warning")
+        return Paragraph(f"The selected design is near {all_of(bounds)}: try a wider region.", "warning")
     inside = not edge.beyond_runs
     return Paragraph(f"{edge.sentence.partition('; ')[0].rstrip('.')}.", detail=Detail.ALL if inside else Detail.LEAST)
 
@@ -520,7 +520,7 @@ def _orbit(title: str, x: Sequence[float], y: Sequence[float], radius: float | N
 
 def power_bars(terms: Sequence[str], points: Mapping[str, Mapping[str, float]]) -> Still:
     """A row of bars a term, one for each point."""
-    words = f"Power loss by term, {' and '.join(points)}"
+    words = f"Power loss by term, {all_of(points)}"
     return Still(
         words, partial(_power_bars, terms, points), width=640.0, height=56.0 + ROW * len(terms), left_margin=110.0
     )  # fmt: skip

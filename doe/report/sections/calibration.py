@@ -17,7 +17,7 @@ from rbdyn.base.files import digest_of, intact, read_json, sign, write_json
 from rbdyn.base.html import REPORT, with_report
 from rbdyn.base.identity import Identity
 from rbdyn.base.tables.sheet import text_of
-from rbdyn.base.words import NORMAL, counted, duration, quantity, shown
+from rbdyn.base.words import NORMAL, all_of, counted, duration, quantity, shown
 from rbdyn.base.workbook import NAME as WORKBOOK
 from rbdyn.scene.unknown import Input
 
@@ -197,7 +197,7 @@ def _hidden_words(name: str, output: identification.OutputAnswer, resolution: fl
     """The offset of an output's sensor that would not be seen, and the inputs that it moves most."""
     shares = sorted(output.moves_sd.items(), key=lambda pair: -abs(pair[1]))
     named = [key for place, (key, share) in enumerate(shares[:MOST_MOVED]) if place == 0 or abs(share) >= MOVED]
-    moves = " and ".join(f"{key} by {shown(output.moves[key], 2)}" for key in named)
+    moves = all_of(f"{key} by {shown(output.moves[key], 2)}" for key in named)
     words = f"an offset of the {name} below {shown(100.0 * resolution, 2)} % would not be seen"
     return f"{words} and moves {moves}" if moves else words
 

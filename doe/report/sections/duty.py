@@ -15,7 +15,7 @@ from doe.workflow.problem import Factor
 from doe.workflow.surfaces import PredictedGain
 from rbdyn.base.blocks import Block, Column, Detail, Figures, Paragraph, Section, Sheet, Table
 from rbdyn.base.faults import one_line
-from rbdyn.base.words import label, quantity, shown, with_error
+from rbdyn.base.words import all_of, label, quantity, shown, with_error
 from rbdyn.result import SimulatedValue
 
 if TYPE_CHECKING:
@@ -90,7 +90,7 @@ def _aggregates(duty: DutyAnswer) -> str:
     groups: dict[str, list[str]] = {}
     for name, aggregate in duty.aggregate.items():
         groups.setdefault(aggregate, []).append(quantity(name)[0])
-    parts = [f"for {' and '.join(names)} {OVER_DUTY[aggregate]}" for aggregate, names in groups.items()]
+    parts = [f"for {all_of(names)} {OVER_DUTY[aggregate]}" for aggregate, names in groups.items()]
     return f"Over the duty: {'; '.join(parts)}." if parts else ""
 
 

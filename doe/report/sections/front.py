@@ -25,7 +25,18 @@ from doe.workflow.problem import Asked, Problem
 from doe.workflow.surfaces import PredictedGain
 from doe.workflow.whole import StudyResult
 from rbdyn.base.blocks import Block, Bullets, Column, Detail, Figures, Heading, Paragraph, Section, Sheet, Table, Widget
-from rbdyn.base.words import NORMAL, chance, counted, error_alone, improvement, label, quantity, shown, with_error
+from rbdyn.base.words import (
+    NORMAL,
+    all_of,
+    chance,
+    counted,
+    error_alone,
+    improvement,
+    label,
+    quantity,
+    shown,
+    with_error,
+)
 
 # Points of a front that are drawn; more cannot be told apart.
 MOST_POINTS = 400
@@ -327,7 +338,7 @@ def search_sentences(outcome: StudyResult) -> list[str]:
 def _answer(outcome: StudyResult) -> str:
     places = [_place(*value) for value in outcome.study.by_factor(outcome.pick.point).items()]
     gains = [f"{name} {improvement(gain.percent, None, gain.goal)}" for name, gain in outcome.gains["pick"].items()]
-    return f"The selected design has {_listed(places)}: by simulation {_listed(gains)} than the baseline."
+    return f"The selected design has {all_of(places)}: by simulation {all_of(gains)} than the baseline."
 
 
 def spent_sentence(study: Problem, adaptive: Adaptive) -> str:
@@ -338,7 +349,7 @@ def spent_sentence(study: Problem, adaptive: Adaptive) -> str:
     moved = dict.fromkeys((face.factor, int(face.side > 0)) for face, _ in search.moves)
     grown = [_place(study.factors[place[0]], float(adaptive.edges[place]), " to") for place in moved]
     runs = f"{counted(len(search.spent), 'run')} of design and search and {search.fresh} fresh runs at its points and the baseline"
-    growth = f" Its region grew: {_listed(grown)}." if grown else ""
+    growth = f" Its region grew: {all_of(grown)}." if grown else ""
     return (
         f"The search ended because {search.stopped}. It took {runs}, in {adaptive.seconds:.0f} s after the end of the design. "
         f"A search without end is expected to gain {further} % more hypervolume (one standard deviation over the fronts that the "
@@ -355,7 +366,7 @@ def limiting_sentence(outcome: StudyResult) -> str:
         beyond = math.nan if pull.face is None else pull.face.better
         odds = "" if math.isnan(beyond) else f" (the front continues beyond with a probability of {beyond:.2f})"
         limits.setdefault(_why(study, pull), []).append(f"{_place(pull.factor, pull.value)}{odds}")
-    why = [f"{_listed(places)}, {words}" for words, places in limits.items()]
+    why = [f"{all_of(places)}, {words}" for words, places in limits.items()]
     why += [f"the limit {limit.text} is near" for limit in near_limits(adaptive, study, outcome.limits)]
     refused = [name for name, chain in outcome.chains.items() if chain.refused]
     why += [f"the parts of dimension chain {name} cannot be made" for name in refused]
@@ -366,9 +377,9 @@ def _why(study: Problem, pull: Pull) -> str:
     """The cause that limits one factor."""
     if pull.face is not None:
         return _end(study, pull.factor) if pull.face.limited_by == "allowed" else CAUSES[pull.face.limited_by]
-    ways = [f"where {_listed(pull.turn)} {'turns' if len(pull.turn) == 1 else 'turn'}"] if pull.turn else []
+    ways = [f"where {all_of(pull.turn)} {'turns' if len(pull.turn) == 1 else 'turn'}"] if pull.turn else []
     gaining = (pull.more, "larger"), (pull.less, "smaller")
-    ways += [f"{_listed(names)} would improve with a {size} value" for names, size in gaining if names]
+    ways += [f"{all_of(names)} would improve with a {size} value" for names, size in gaining if names]
     return " and ".join(ways) or "where no response changes much"
 
 
@@ -393,12 +404,12 @@ def trust_sentence(study: Problem, adaptive: Adaptive) -> str:
     errors = [f"{name} {times:.1f}" for name, times in zip(study.responses, missed, strict=True)]
     overconfident = [name for name, times in zip(study.responses, missed, strict=True) if times > SUFFICIENT_MISS]
     if overconfident:
-        claim = f"so their stated uncertainty of {_listed(overconfident)} is too small"
+        claim = f"so their stated uncertainty of {all_of(overconfident)} is too small"
     else:
         claim = "as their stated uncertainty allows"
     return (
         f"At {counted(len(front.points), 'front point')} the emulators were optimistic on average by these shares of the front's range: "
-        f"{_listed(optimism)}. Their RMS errors in standard deviations are {_listed(errors)}, {claim}. "
+        f"{all_of(optimism)}. Their RMS errors in standard deviations are {all_of(errors)}, {claim}. "
         "The front is reported by these fresh runs alone."
     )
 
@@ -419,7 +430,3 @@ def comparison_sentence(adaptive: Adaptive, volumes: FrontComparison) -> str:
 def _place(name: str, value: float, before: str = "") -> str:
     words, unit = quantity(name)
     return f"{words}{before} {value:.4g} {unit}".rstrip()
-
-
-def _listed(parts: Sequence[str]) -> str:
-    return " and ".join(filter(None, (", ".join(parts[:-1]), parts[-1])))

@@ -14,7 +14,7 @@ from rbdyn.base.blocks import Block, Bullets, Column, Paragraph, Section, Sheet,
 from rbdyn.base.files import write_json
 from rbdyn.base.records import Record, written
 from rbdyn.base.tables.sheet import text_of
-from rbdyn.base.words import counted, quantity, shown
+from rbdyn.base.words import all_of, counted, quantity, shown
 from rbdyn.scene.unknown import UnknownInput
 
 # Most inputs that a sentence names, and the least share of one.
@@ -131,7 +131,7 @@ def _causes(output: OutputRange) -> str:
     least = max(output.floor.high, LEAST_SHARE_NAMED)
     ranked = sorted(((share, key) for key, share in output.shares.items() if share.value > least), reverse=True)
     return (
-        " and ".join(f"{key} causes {100.0 * share.value:.0f} %" for share, key in ranked[:CAUSES_NAMED])
+        all_of(f"{key} causes {100.0 * share.value:.0f} %" for share, key in ranked[:CAUSES_NAMED])
         or "no input dominates"
     )
 

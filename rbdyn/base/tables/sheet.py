@@ -24,7 +24,7 @@ from rbdyn.base.notes import Note, Notes
 from rbdyn.base.records import NUMBER, Record, plain_cell, quoted_cell
 from rbdyn.base.tables.decimal_marks import POINT, Exact, Marks, is_like_number, marks_of
 from rbdyn.base.tables.workbook import ARCHIVE, OLD, SUFFIXES, letters, read_workbook, split_path
-from rbdyn.base.words import counted
+from rbdyn.base.words import all_of, counted
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -213,8 +213,7 @@ def _table(
     # Commas between fields are usual with decimal points; other files say which mark their numbers have.
     points = ["decimal points"] if default is None and marks.decimal == POINT else []
     signs = [*([separator] if separator else []), *points, *marks.words]
-    together = " and ".join([*([", ".join(signs[:-1])] if signs[1:] else []), *signs[-1:]])
-    words = [*([f"with {together}"] if signs else []), *([origin] if origin else [])]
+    words = [*([f"with {all_of(signs)}"] if signs else []), *([origin] if origin else [])]
     names = [plain_cell(name.strip()) for name in header]
     if len(names) == 1 and "|" in names[0]:
         raise InputError(f"{path}: has '|' between its fields; write commas there and points in numbers")

@@ -11,7 +11,7 @@ import numpy as np
 
 from rbdyn.base.faults import RPM
 from rbdyn.base.notes import Note, Notes
-from rbdyn.base.words import shown
+from rbdyn.base.words import all_of, shown
 from rbdyn.contact.film_thickness import half_width, hertz_pressure
 from rbdyn.contact.hertz_line import ROLLERS, palmgren, pressure_notes
 from rbdyn.contact.rolling_resistance import THINNEST_LAYER, inlet
@@ -343,7 +343,7 @@ def traction_law_notes(scene: Scene, slip: float) -> Notes:
         return ()
     sentence = (
         f"cage slip: {100.0 * slip:.2g} % depends on {LAW} = '{scene.traction.model}' (as does its change with temperature "
-        f"and clearance). Compare {' and '.join(map(repr, others))}, which doe uncertainty draws where [uncertain] names the key"
+        f"and clearance). Compare {all_of(map(repr, others))}, which doe uncertainty draws where [uncertain] names the key"
     )
     return (Note("traction-law", sentence),)
 
