@@ -198,7 +198,7 @@ def _study_or_table(
 def _read_later(study: "Problem", data: Path | None) -> list[Path]:
     """Files that a step reads only as it runs: those that its study names, and the table of runs."""
     from doe.workflow.status import named_files
-    from rbdyn.base.tables.workbook import split_path
+    from rbdyn.base.tables.sheet import split_path
 
     named = [] if study.file.scene is None else named_files(study)
     return [split_path(path)[0] for path in (*named, *([] if data is None else [data]))]

@@ -34,8 +34,7 @@ from rbdyn.base.faults import (
 from rbdyn.base.notes import Note, Notes
 from rbdyn.base.records import Record
 from rbdyn.base.tables.decimal_marks import is_like_number
-from rbdyn.base.tables.sheet import DATE, InputColumn, InputTable, listed, quoted, read_sheet
-from rbdyn.base.tables.workbook import split_path
+from rbdyn.base.tables.sheet import DATE, InputColumn, InputTable, listed, quoted, read_sheet, split_path
 from rbdyn.result import START_FIGURES
 from rbdyn.scene.duty import DutyPoint
 from rbdyn.scene.uncertain import DECLARATIONS, RUN_KEYS, SEEDS, Uncertain

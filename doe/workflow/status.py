@@ -26,7 +26,7 @@ from rbdyn.base.faults import InputError, read_bytes, read_toml
 from rbdyn.base.files import code_version, digest_of, intact, read_json, versions
 from rbdyn.base.identity import Identity, identity_of
 from rbdyn.base.records import Record, plain
-from rbdyn.base.tables.workbook import split_path
+from rbdyn.base.tables.sheet import split_path
 from rbdyn.scene import Scene
 
 # Typical wall time [s] of surfaces, front, pictures and report.

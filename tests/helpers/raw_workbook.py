@@ -10,6 +10,8 @@ OFFICE = "http://schemas.openxmlformats.org/officeDocument/2006/relationships"
 PACKAGE = "http://schemas.openxmlformats.org/package/2006/relationships"
 MAIN = "http://schemas.openxmlformats.org/spreadsheetml/2006/main"
 SHEET, STYLES, STRINGS, BOOK = "xl/worksheets/sheet1.xml", "xl/styles.xml", "xl/sharedStrings.xml", "xl/workbook.xml"
+CONTENT = "http://schemas.openxmlformats.org/package/2006/content-types"
+KIND = "application/vnd.openxmlformats-officedocument.spreadsheetml"
 HEADER = '<row r="1"><c r="A1" t="s"><v>0</v></c><c r="B1" t="s"><v>1</v></c><c r="C1" t="s"><v>2</v></c></row>'
 
 
@@ -44,7 +46,12 @@ def write(path: Path, parts: dict[str, str] | None = None, sheets: int = 1) -> P
     links = [(f"s{number}", "worksheet", f"worksheets/sheet{number}.xml") for number in range(1, sheets + 1)]
     links += [("styles", "styles", "styles.xml"), ("texts", "sharedStrings", "sharedStrings.xml")]
     texts = "".join(f"<si><t>{name}</t></si>" for name in "aby")
+    kinds = "".join(
+        f'<Override PartName="/{name}" ContentType="{KIND}.{kind}+xml"/>'
+        for name, kind in ((BOOK, "sheet.main"), (STRINGS, "sharedStrings"), (STYLES, "styles"))
+    )
     usual = {
+        "[Content_Types].xml": f'<Types xmlns="{CONTENT}">{kinds}</Types>',
         "_rels/.rels": relations([("main", "officeDocument", BOOK)]),
         "xl/_rels/workbook.xml.rels": relations(links),
         BOOK: book(("Runs", "visible")),

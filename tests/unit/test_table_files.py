@@ -182,7 +182,7 @@ def test_what_is_no_workbook_is_refused_in_one_sentence(tmp_path):
     assert "save it as .xlsx or as CSV" in fault_of(old)
     with zipfile.ZipFile(path, "w") as archive:
         archive.writestr("content.xml", "<x/>")
-    assert "is a damaged workbook (part _rels/.rels); open it in Excel and save it again" in fault_of(path)
+    assert "is a damaged workbook (its parts); open it in Excel and save it again" in fault_of(path)
     path.write_bytes(b"")
     assert "is not an Excel workbook" in fault_of(path)
     assert "is empty; write a header" in fault_of(workbook(tmp_path / "empty.xlsx", []))

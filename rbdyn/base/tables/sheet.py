@@ -23,7 +23,6 @@ from rbdyn.base.faults import LONGEST_NAME, MOST_FAULTS, InputError, not_utf_8, 
 from rbdyn.base.notes import Note, Notes
 from rbdyn.base.records import NUMBER, Record, plain_cell, quoted_cell
 from rbdyn.base.tables.decimal_marks import POINT, Exact, Marks, is_like_number, marks_of
-from rbdyn.base.tables.workbook import ARCHIVE, OLD, SUFFIXES, letters, read_workbook, split_path
 from rbdyn.base.words import all_of, counted
 
 if TYPE_CHECKING:
@@ -32,6 +31,9 @@ if TYPE_CHECKING:
 PARQUET = (".parquet", ".pq")
 SEPARATORS = {",": "commas", ";": "semicolons", "\t": "tabs"}
 SEMICOLONS = ", or save it with semicolons if its numbers have decimal commas"
+WORKBOOKS, SHEET_PATH = (".xlsx", ".xlsm"), re.compile(r"(.+\.xls[xm]):([^:]+)", re.IGNORECASE | re.DOTALL)
+# First bytes of an archive, as of a workbook, and of an old or encrypted workbook.
+ARCHIVES = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0")
 # Excel's own line on the separator of a file.
 HINT = re.compile(r"\s*sep=([,;\t])\r?\n", re.IGNORECASE)
 # Most rows and cells of a text; those of a workbook are fewer, for it takes ten times as long to read.
@@ -158,7 +160,11 @@ class InputTable(Record):
         """The column of this name."""
         place = self.places[name]
         texts = [plain_cell(row[place].strip()) for row in self.rows]
-        cells = [f"cell {letters(place)}{number}" for number in self.numbers]
+        cells = list[str]()
+        if self.numbers:
+            from openpyxl.utils import get_column_letter
+
+            cells = [f"cell {get_column_letter(place + 1)}{number}" for number in self.numbers]
         return InputColumn(self.path, name, texts, self.marks, cells)
 
     @property
@@ -181,19 +187,28 @@ def read_sheet(path: Path) -> InputTable:
     file, sheet = split_path(path)
     if file.suffix.lower() in PARQUET:
         return _table(path, _frame_rows(_parquet(file)), POINT, "", "")
-    if file.suffix.lower() in SUFFIXES:
+    if file.suffix.lower() in WORKBOOKS:
+        # openpyxl takes a fifth of a second to import.
+        from rbdyn.base.tables.workbook import read_workbook
+
         table = read_workbook(file, read_bytes(file), sheet)
         rows, numbers = table.rows, table.numbers
         width = max(map(len, rows), default=0)
         rows = [[*row, *[""] * (width - len(row))] for row in rows]
         return _table(path, rows, None, "", table.note, numbers)
     data = read_bytes(file)
-    if file.suffix.lower() == ".ods" or data.startswith((ARCHIVE, OLD)):
+    if file.suffix.lower() == ".ods" or data.startswith(ARCHIVES):
         raise InputError(f"{path}: is not a text table; save it as .xlsx or as CSV, with that ending of its name")
     text, encoding = _decoded(path, data)
     separator, rows = _fields(path, text)
     words = "" if separator == "," else SEPARATORS.get(separator, "")
     return _table(path, rows, POINT if separator == "," else None, words, encoding)
+
+
+def split_path(path: Path) -> tuple[Path, str | None]:
+    """The file of a path, and the sheet that ``file.xlsx:Sheet`` names, if any."""
+    named = None if path.exists() else SHEET_PATH.fullmatch(str(path))
+    return (Path(named[1]), named[2]) if named else (path, None)
 
 
 def sheet_of_frame(frame: "pd.DataFrame", path: Path) -> InputTable:
