@@ -31,7 +31,7 @@ from prose import (
 LONGEST_FILE, LONGEST_FUNCTION, MOST_AT_THE_ROOT = 600, 70, 6
 # Lines of code of both packages. A change may lower this freely. Raise it only with the feature that needs it, and say by
 # how much in the commit.
-MOST_CODE = 48_859
+MOST_CODE = 48_747
 TOP = {
     ".ci",
     ".gitignore",
@@ -54,7 +54,6 @@ EDGES = {
     "rbdyn/cli/": "speaks to people",
     "rbdyn/plots/": "speaks to people",
     "rbdyn/accuracy/coverage.py": "makes a scene of a scene",
-    "rbdyn/accuracy/variants.py": "makes scenes of a scene",
     "rbdyn/result.py": "is the saved record",
     "rbdyn/quasistatic/result.py": "is the saved record",
     "rbdyn/quasistatic/preload.py": "makes scenes of a scene",

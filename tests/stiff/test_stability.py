@@ -4,22 +4,13 @@ from __future__ import annotations
 
 import json
 
+import extremes
 import pandas as pd
 import pytest
+from extremes import CLOSED, OPEN, REFUSED, STOPPED, TIGHTENED, Ending, battery, cases, ending
 
-from rbdyn.accuracy import variants, write
-from rbdyn.accuracy.variants import (
-    CLOSED,
-    OPEN,
-    REFUSED,
-    STOPPED,
-    TIGHTENED,
-    Ending,
-    battery,
-    cases,
-    ending,
-    with_options,
-)
+from rbdyn.accuracy import write
+from rbdyn.accuracy.variants import with_options
 from rbdyn.base.faults import InputError
 from rbdyn.scene import Scene
 
@@ -76,21 +67,21 @@ def test_unit_ways_to_end(rows):
 
 def test_unit_open_balance_is_unexplained(outer, monkeypatch):
     """Unit: a balance that stays open though the tolerance was tightened makes the battery fail."""
-    monkeypatch.setattr(variants, "LARGEST_GAP", 1e-12)
+    monkeypatch.setattr(extremes, "LARGEST_GAP", 1e-12)
     row = ending(outer, "as given", ())
     assert row.status == OPEN and row.unexplained and "even at rtol 0.001" in row.reason
-    assert variants.report([row]).record["status"] == "1 of 1 cases failed without a diagnosis"
+    assert extremes.report([row]).record["status"] == "1 of 1 cases failed without a diagnosis"
 
 
 def test_unit_record_and_files(rows, tmp_path):
     """Unit: JSON without NaN, a line a case in the table, as many cells as headings."""
     listed = list(rows.values())
-    report = variants.report(listed)
-    assert write(report, tmp_path) == ["stability.json", "stability.csv"]
-    saved = json.loads((tmp_path / "stability.json").read_text())
-    assert saved["format"] == "rbdyn.stability/1" and saved["status"] == "ok"
+    report = extremes.report(listed)
+    assert write(report, tmp_path) == ["extremes.json", "extremes.csv"]
+    saved = json.loads((tmp_path / "extremes.json").read_text())
+    assert saved["format"] == "rbdyn.extremes/1" and saved["status"] == "ok"
     assert [case["case"] for case in saved["cases"]] == list(rows)
-    assert len(pd.read_csv(tmp_path / "stability.csv")) == len(rows)
+    assert len(pd.read_csv(tmp_path / "extremes.csv")) == len(rows)
     (table,) = report.tables
     assert [line[0] for line in table.rows] == list(rows) and {len(line) for line in table.rows} == {len(table.header)}
 
@@ -115,20 +106,15 @@ def test_unit_singular_laws_are_refused(assignments, key):
     assert key in fault and any(mend in fault for mend in ("must be", "give at least", "take fewer"))
 
 
-def test_command_line_exit_codes(monkeypatch):
-    """Command line: one JSON object; 0 where all is explained, 1 where a balance stays open."""
-    from typer.testing import CliRunner
-
-    from rbdyn.cli.app import app
-
+def test_command_line_exit_codes(monkeypatch, capsys):
+    """Command line: 0 where all is explained, 1 where a balance stays open; every reason is printed."""
+    monkeypatch.setattr("sys.argv", ["extremes.py", EXAMPLE])
     for status, code in ((CLOSED, 0), (REFUSED, 0), (OPEN, 1)):
         monkeypatch.setattr(
-            variants, "battery", lambda scene, progress, status=status: [Ending("a case", (), status, "why")]
+            extremes, "battery", lambda scene, progress, status=status: [Ending("a case", (), status, "why")]
         )
-        done = CliRunner().invoke(app, ["accuracy", EXAMPLE, "stability", "--json"])
-        assert done.exit_code == code and json.loads(done.stdout)["cases"][0]["status"] == status
-        shown = CliRunner().invoke(app, ["accuracy", EXAMPLE, "stability", "-q"])
-        assert shown.exit_code == code and "a case: why" in shown.stdout
+        assert extremes.main(extremes.study, "about") == code
+        assert "a case: why" in capsys.readouterr().out
 
 
 @pytest.mark.slow
