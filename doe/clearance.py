@@ -23,7 +23,7 @@ from doe.running.store import STORE, Failure, Point, Store
 from rbdyn.base.arrays import Array, Whole
 from rbdyn.base.faults import InputError, RunError
 from rbdyn.base.files import code_version, run_key
-from rbdyn.base.notes import verdict
+from rbdyn.base.notes import LOST_CLEARANCE, verdict
 from rbdyn.base.records import Record
 from rbdyn.dynamics.figures import FIGURES
 from rbdyn.result import SimulationResult, arrays_of
@@ -263,8 +263,8 @@ def attempt(scene: Scene, stop: "Stop | None" = None, workers: int = 1) -> RunOu
 
 
 def heat_fault(result: SimulationResult) -> str | None:
-    """Why a result has no steady temperatures, or too high ones; None for a sound one."""
-    if result.status == "ok":
+    """Why a result has no steady temperatures, or too high ones; None for a sound one, or one whose clearance is a preload."""
+    if result.status in ("ok", LOST_CLEARANCE):
         return None
     return f"{result.status}: {(result.thermal and result.thermal.reason) or verdict(result.notes)}"
 

@@ -168,7 +168,7 @@ def moved_region(study: Problem, balance: Balances, kept: float = KEPT) -> Regio
     notes += [_moved_note(original, study, key, taken) for key, taken in moves.items()]
     notes += [_lost_note(study, taken, heat) for key, taken in short.items() if key not in movable]
     if not moves:
-        return Region(study, tuple(notes))
+        return Region(study, (*notes, *_scene_notes(study, heat)))
     study, baseline_notes = _with_baseline(original, study, balance, heat)
     return Region(study, (*notes, *baseline_notes))
 
@@ -393,10 +393,11 @@ def _moved_note(before: Problem, after: Problem, key: str, taken: Taken) -> Note
     assert place is not None
     words, unit = quantity(before.factors[place])
     (low, high), (new_low, new_high) = before.ends[place], after.ends[place]
-    verb = "moved" if new_high > high * (1.0 + 1e-9) else "was narrowed"
+    verb = "moved" if new_high > high * (1.0 + 1e-9) else "narrowed"
     return Note(
         "region",
-        f"The region of the {words} {verb} from {low:.3f}-{high:.3f} to {new_low:.3f}-{new_high:.3f} {unit}: {taken.at}{taken.causes}.",
+        f"The region of the {words} was {verb} to {new_low:.3f} to {new_high:.3f} {unit} (before: {low:.3f} to {high:.3f} {unit}): "
+        f"{taken.at}{taken.causes}.",
     )
 
 
@@ -413,7 +414,7 @@ def _lost_note(study: Problem, taken: Taken, heat: Heat) -> Note:
     why = "runs of a table keep its region where it is" if stays else "no factor moves it"
     return Note(
         "seizure",
-        f"{'Seizure' if running.seizes else 'Nearly lost'}: {words} in operation is {1e6 * running.play.operating:.0f} um {taken.at}at "
+        f"{'Seizure' if running.lost else 'Nearly lost'}: {words} in operation is {1e6 * running.play.operating:.0f} um {taken.at}at "
         f"the edge of the region, where {1e6 * taken.floor:.0f} um are its floor; {why}.",
     )
 
@@ -423,7 +424,7 @@ def _with_baseline(
 ) -> tuple[Problem, list[Note]]:
     """The moved study with the baseline of the original one, or, where that seizes, with its own centre."""
     point = original.baseline
-    seized = [(running, name) for name, running in _running(original, point, heat) if running.seizes]
+    seized = [(running, name) for name, running in _running(original, point, heat) if running.lost]
     if not seized:
         ends = _endangered(original, point, heat)
         found = _balanced(original, balance, point, list(ends), "the baseline design")
@@ -431,15 +432,29 @@ def _with_baseline(
     baseline: dict[str, Any] = original.by_factor(point)
     notes = []
     if seized:
-        running, name = min(seized, key=lambda pair: pair[0].kelvins_left)
-        words, _ = quantity(running.key.rpartition(".")[2])
-        left = f"{1e6 * running.play.operating:.0f} um{f' at {name}' if name else ''}"
-        heats = "" if running.seizes else ", which its own heat closes"
         baseline = moved.by_factor(moved.centre)
-        notes.append(
-            Note(
-                "seizure",
-                f"Seizure: {words} of the baseline design in operation is {left}{heats}; gains are over the middle of the region instead.",
-            )
-        )
+        notes.append(Note("seizure", _replaced(seized, "the baseline design")))
     return moved.with_file(baseline=baseline), notes
+
+
+def _scene_notes(study: Problem, heat: Heat) -> list[Note]:
+    """A warning where the scene's own clearances seize, and so the study has the middle of its region as baseline."""
+    drawn = study.baseline.copy()
+    for place, factor in enumerate(study.file.factor):
+        table, _, key = factor.key.rpartition(".")
+        drawn[place] = study.scene_tables.get(table, {}).get(key, drawn[place])
+    if study.file.baseline or (drawn == study.baseline).all():
+        return []
+    seized = [(running, name) for name, running in _running(study, drawn, heat) if running.lost]
+    return [Note("region", _replaced(seized, study.scene.file))] if seized else []
+
+
+def _replaced(seized: Sequence[tuple[RunningClearance, str]], design: str) -> str:
+    """That the middle of the region replaces a ``design`` that seizes, by its clearances at points of the duty."""
+    running, name = min(seized, key=lambda pair: pair[0].kelvins_left)
+    words, _ = quantity(running.key.rpartition(".")[2])
+    left = f"{1e6 * running.play.operating:.0f} um{f' at {name}' if name else ''}"
+    heats = "" if running.lost else ", which its own heat closes"
+    return (
+        f"Seizure: {words} of {design} in operation is {left}{heats}; gains are over the middle of the region instead."
+    )

@@ -125,9 +125,11 @@ class Note(str):
 Notes = tuple[Note, ...]
 # Codes by the first words of the status of a result without a sound answer; codes of simulated figures that no bearing has, each
 # with the status that it gives the result.
+LOST_CLEARANCE = "lost clearance"
 STATUS_CODES = {
     "overloaded": "overload",
     "seizure": "seizure",
+    LOST_CLEARANCE: "seizure",
     "too hot": "heat",
     "no steady state": "heat",
     "undecided": "undecided",
@@ -145,7 +147,7 @@ def status_notes(status: str) -> Notes:
 
 
 def status_of(notes: Iterable[Note]) -> str:
-    """The status of a result with these notes: "ok", or what makes its figures impossible."""
+    """The status of figures with these notes: "ok", or what makes them impossible."""
     return next((IMPOSSIBLE[note.code] for note in notes if note.code in IMPOSSIBLE), "ok")
 
 

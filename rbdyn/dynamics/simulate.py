@@ -10,7 +10,7 @@ import numpy as np
 
 from rbdyn.base.arrays import Array
 from rbdyn.base.files import versions
-from rbdyn.base.notes import Note, Notes, status_of
+from rbdyn.base.notes import Note, Notes
 from rbdyn.base.words import Notice
 from rbdyn.compiled.kernel import COMPILING
 from rbdyn.dynamics.cage_verdict import verdict_of
@@ -172,7 +172,7 @@ def _gather(scene: Scene, ensemble: Ensemble, clock: dict[str, float]) -> Simula
         *stiffness_notes(scene, runs),
     )
     return SimulationResult(
-        status=status_of(notes),
+        status=validity.status(scene, notes),
         figures={figure.key: figures[figure.key] for figure in BEARING if figure.key in figures},
         power_balance=PowerBalance(power_gap),
         power_terms_W=terms,

@@ -21,7 +21,7 @@ import numpy as np
 
 from rbdyn.base.arrays import Array
 from rbdyn.base.faults import InputError, RunError
-from rbdyn.base.notes import Note, Notes, status_notes
+from rbdyn.base.notes import Note, Notes, status_notes, status_of
 from rbdyn.dynamics.ensemble import Reporter
 from rbdyn.dynamics.forces.equations import RollerBearing
 from rbdyn.dynamics.parameters import heat
@@ -425,7 +425,7 @@ def _result(
     return replace(
         result,
         figures=figures,
-        status=result.status if status == "steady" else status,
+        status=status_of(result.notes) if status == "steady" else status,
         temperatures_C=temperatures,
         part_figures=at_temperatures_with_errors(scene, result.part_figures or {}, temperatures),
         thermal=thermal,

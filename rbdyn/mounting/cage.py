@@ -52,6 +52,11 @@ class RunningClearance(NamedTuple):
         return self.play.operating <= self.touching
 
     @property
+    def lost(self) -> bool:
+        """Whether the parts seize, or a clearance of the drawing has become a preload."""
+        return self.seizes or self.play.operating < 0.0 <= self.play.drawn
+
+    @property
     def kelvins_left(self) -> float:
         """Further difference of temperatures between the parts after which they touch [K]."""
         return (self.play.operating - max(self.touching, 0.0)) / self.growth

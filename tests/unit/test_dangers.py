@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from conftest import ROOT
+from conftest import EXAMPLE, ROOT
 from instant_runs import instant_result
 from typer.testing import CliRunner
 
@@ -23,6 +23,7 @@ from rbdyn.base.faults import RPM
 from rbdyn.base.notes import CODES, Level, Note, condensed, ranked, status_notes, status_of, verdict
 from rbdyn.cli.app import app
 from rbdyn.contact.hertz_line import BALLS, ROLLERS, SHAKEDOWN, pressure_notes
+from rbdyn.dynamics.parameters import validity
 from rbdyn.mounting.cage import OperatingClearance
 from rbdyn.result import SimulationResult
 from rbdyn.scene import Scene
@@ -221,3 +222,19 @@ def test_a_ball_bearing_beyond_shakedown_has_no_answer(tmp_path):
     for load, reason in ((120_000.0, "shakedown"), (190_000.0, "reduce the load")):
         shown = CliRunner().invoke(app, ["ball", str(scene), "--set", f"operation.radial_load_N={load}"])
         assert shown.exit_code == 1 and shown.stdout.startswith("Danger: overloaded: ") and reason in shown.stderr
+
+
+@pytest.mark.parametrize(
+    ("interference_um", "status"), [(40.0, "ok"), (90.0, "lost clearance"), (90.0, "with a heat balance")]
+)
+def test_unit_a_clearance_that_fits_take_fails_a_run_without_a_heat_balance(interference_um, status):
+    """Unit: 0.7 to 0.8 of an interference fit closes the clearance of 50 um; only a heat balance tells whether a preload lasts."""
+    sizes = {"bore_mm": 27, "outside_diameter_mm": 60, "width_mm": 11, "housing_diameter_mm": 90, "rotation": "false"}
+    parts = {f"{part}_temperature_C": 20 for part in ("outer_ring", "inner_ring", "roller", "cage")}
+    fits = {"inner_interference_um": interference_um, "outer_interference_um": 0}
+    sets = [f"mounting.{key}={value}" for key, value in (sizes | parts | fits).items()]
+    scene = Scene.load(EXAMPLE, ["bearing.radial_clearance_mm=0.05", *sets])
+    if status == "with a heat balance":
+        scene, status = scene.model_copy(update={"thermal": object()}), "ok"
+    assert validity.status(scene, ()) == status
+    assert validity.status(scene, (Note("overload", "overload"),)) == "overloaded"

@@ -95,9 +95,12 @@ def hot_study(
     more: str = "",
     tables: str = "",
     limit: str = "",
+    drawn: float | None = None,
 ) -> Problem:
-    """A study of the example with a hot PEEK cage, in a folder of its own."""
+    """A study of the example with a hot PEEK cage, in a folder of its own; ``drawn``: guide clearance of the scene."""
     scene = (EXAMPLES / "cylindrical_roller.toml").read_text(encoding="utf-8")
+    line = next(line for line in scene.splitlines() if line.startswith("guide_clearance_mm"))
+    scene = scene.replace(line, f"guide_clearance_mm = {centre if drawn is None else drawn}")
     (folder / "scene.toml").write_text(scene + HOT_PARTS.format(cage=cage), encoding="utf-8")
     text = STUDY.format(centre=centre, step=step, more=more, limit=limit) + tables
     (folder / "study.toml").write_text(text, encoding="utf-8")
@@ -151,9 +154,7 @@ def test_unit_a_region_is_narrowed_to_where_the_cage_runs(tmp_path):
     guide = scene.running_clearances(scene.mounting)["guide"]
     assert guide.floor < guide.play.operating < guide.floor + 0.02e-3
     assert high == pytest.approx(0.3, abs=2e-3) and 0.15 < low < 0.22
-    assert note.code == "region" and note.startswith(
-        "The region of the guide clearance was narrowed from 0.100-0.300 to "
-    )
+    assert note.code == "region" and note.startswith("The region of the guide clearance was narrowed to ")
     assert f"heat takes {taken:.3f} mm of it" in note
     assert (tmp_path / "study.toml").read_bytes() == before
     assert moved_region(moved, unheated).notes == () and moved_region(moved, unheated).study is moved
@@ -164,7 +165,7 @@ def test_unit_a_region_that_has_too_little_left_moves(tmp_path):
     moved, notes = moved_region(hot_study(tmp_path, centre=0.1, step=0.04), unheated)
     low, high = (float(moved.actual(np.full(2, side))[0]) for side in (-1.0, 1.0))
     assert high - low == pytest.approx(0.04, abs=2e-3) and low > 0.16
-    assert "moved from 0.060-0.140 to" in notes[0]
+    assert "(before: 0.060 to 0.140 mm): " in notes[0]
     wide = hot_study(tmp_path, centre=0.4)
     assert moved_region(wide, unheated) == (wide, ())
 
@@ -201,7 +202,7 @@ def test_unit_impossible_regions_are_refused_in_a_sentence(tmp_path):
         moved_region(hot_study(tmp_path, centre=0.1, step=0.04, more="allowed = [0.05, 0.15]"), unheated)
     result = CliRunner().invoke(app, ["design", str(tmp_path / "study.toml")])
     assert result.exit_code == 2 and "has to begin at" in result.stdout + result.stderr
-    study = hot_study(tmp_path, centre=0.1, step=0.04)
+    study = hot_study(tmp_path, centre=0.1, step=0.04, drawn=0.15)
     text = (tmp_path / "study.toml").read_text(encoding="utf-8").replace("cage.guide_clearance_mm", "cage.mass_g")
     (tmp_path / "study.toml").write_text(
         text.replace("centre = 0.1\n", "centre = 40.0\n").replace("step = 0.04", "step = 4.0"), encoding="utf-8"
@@ -361,7 +362,10 @@ def test_a_land_that_heats_itself_moves_the_region_on(tmp_path, monkeypatch):
     assert 0.23 <= low < 0.27 and ran[-1].cage.guide_clearance_mm == pytest.approx(0.21)
     (note,) = region.notes
     assert (
-        note.startswith("The region of the guide clearance was narrowed from 0.210-0.530") and "and heat itself" in note
+        note.startswith(
+            "The region of the guide clearance was narrowed to 0.240 to 0.530 mm (before: 0.210 to 0.530 mm)"
+        )
+        and "and heat itself" in note
     )
 
 
@@ -374,18 +378,24 @@ def test_an_oil_too_hot_is_told_before_the_design_runs(tmp_path, monkeypatch):
 
 
 def test_doe_new_writes_the_region_that_runs(tmp_path, monkeypatch):
-    """The centre moves with the whole width; the study that it writes needs no other move; a scene that runs is not changed."""
-    hot_study(tmp_path)
+    """The centre moves with the whole width; the study that it writes needs no other move; a scene that runs is not changed.
+
+    Both say that the middle of the region replaces the drawing, which seizes.
+    """
+    hot_study(tmp_path, drawn=0.15)
     monkeypatch.chdir(tmp_path)
     result = CliRunner().invoke(app, ["new", "scene.toml"])
     assert result.exit_code == 0, result.output
-    assert "The region of the guide clearance moved from " in result.stderr
+    assert "(before: 0.075 to 0.225 mm): heat takes" in result.stderr
     data = tomllib.loads(result.stdout)
     guide = next(factor for factor in data["factor"] if factor["name"] == "guide_clearance_mm")
     assert guide["centre"] > 0.15 and guide["step"] == pytest.approx(0.057, abs=1e-3)
     (tmp_path / "written.toml").write_text(result.stdout, encoding="utf-8")
-    assert moved_region(Problem.load(tmp_path / "written.toml"), unheated).notes == ()
-    hot_study(tmp_path, cage=30.0)
+    (note,) = moved_region(Problem.load(tmp_path / "written.toml"), unheated).notes
+    replaced = "in operation is -12 um; gains are over the middle of the region instead."
+    assert note.code == "region" and note == f"Seizure: guide clearance of scene.toml {replaced}"
+    assert f"Seizure: guide clearance of the baseline design {replaced}" in result.stderr
+    hot_study(tmp_path, cage=30.0, drawn=0.15)
     result = CliRunner().invoke(app, ["new", "scene.toml"])
     assert "baseline" not in tomllib.loads(result.stdout) and result.stderr == ""
 
@@ -460,3 +470,12 @@ def test_a_pick_that_fails_gives_way(failing, tmp_path):
     outcome = run_study(failing, tmp_path, 1, lambda title: silent)
     assert outcome.pick.point[0] >= 0.37 and not isinstance(outcome.pick, Failure)
     assert outcome.notes[0].startswith("3 design runs failed") and len(outcome.design.coded) == 13
+
+
+def test_unit_a_clearance_that_fits_turn_into_a_preload_is_lost():
+    """Unit: a radial clearance may be a preload on the drawing, but not become one."""
+    play = OperatingClearance(2e-5, -3e-5, 0.0)
+    radial = RunningClearance("bearing.radial_clearance_mm", play, -np.inf, 1e-6)
+    assert radial.lost and not radial.seizes
+    assert not radial._replace(play=play._replace(drawn=-1e-6)).lost
+    assert not radial._replace(play=play._replace(fit=-1e-5)).lost

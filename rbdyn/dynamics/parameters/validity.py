@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rbdyn.base.faults import RPM
-from rbdyn.base.notes import Note, Notes
+from rbdyn.base.notes import LOST_CLEARANCE, Note, Notes, status_of
 from rbdyn.base.words import all_of, shown
 from rbdyn.contact.film_thickness import half_width, hertz_pressure
 from rbdyn.contact.hertz_line import ROLLERS, palmgren, pressure_notes
@@ -282,6 +282,14 @@ def limit_notes(scene: Scene) -> Notes:
         *clearance_notes(scene.clearances, floors),
         *speed_notes(inner - outer, scene.bearing.pitch_diameter, reference),
     )
+
+
+def status(scene: Scene, notes: Notes) -> str:
+    """Status of figures with these ``notes``; "lost clearance" without a heat balance, which alone tells whether a preload lasts."""
+    mounting, found = scene.mounting, status_of(notes)
+    if found != "ok" or mounting is None or scene.thermal is not None:
+        return found
+    return LOST_CLEARANCE if any(clear.lost for clear in scene.running_clearances(mounting).values()) else found
 
 
 def light_load_notes(scene: Scene) -> Notes:
