@@ -6,6 +6,7 @@ A person sees how many rows ended, the span of the main figures, and the causes 
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack, nullcontext
 from dataclasses import dataclass, field, replace
+from operator import itemgetter
 from pathlib import Path
 from statistics import median
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -16,6 +17,7 @@ from rbdyn.base.blocks import Block, Column, Paragraph, Sheet, columns_of, with_
 from rbdyn.base.faults import InputError
 from rbdyn.base.files import write_json
 from rbdyn.base.folder import output_folder
+from rbdyn.base.notes import Note
 from rbdyn.base.records import Record, shown
 from rbdyn.base.words import Notice, counted, label
 
@@ -48,13 +50,27 @@ class Span(Record):
 CAUSES: "tuple[Column[Cause], ...]" = (
     Column("cause", text=True),
     Column("count", "d", "rows", at=lambda cause: len(cause.runs)),
-    Column("names", words="which", at=lambda cause: _names(cause), text=True),
+    Column("names", words="which", at=lambda cause: _names(cause.labels), text=True),
 )
 
 
-def _names(cause: "Cause") -> str:
-    further = len(cause.labels) - ROWS_NAMED
-    return ", ".join([*cause.labels[:ROWS_NAMED], *([f"{further} more"] if further > 0 else [])])
+def _names(labels: Sequence[str]) -> str:
+    further = len(labels) - ROWS_NAMED
+    return ", ".join([*labels[:ROWS_NAMED], *([f"{further} more"] if further > 0 else [])])
+
+
+def _dangers(runs: "Sequence[RowRun]") -> list[Note]:
+    """The dangers of rows, those that differ in their numbers alone once."""
+    from doe.running.store import alike
+
+    groups = alike([(run.row.name, note) for run in runs for note in run.dangers], itemgetter(1))
+    return [
+        group[0][1].about(
+            f"in {'row' if len(group) == 1 else 'rows'} {_names([name for name, _ in group])}"
+            f"{'; values of the first' if len({note for _, note in group}) > 1 else ''}"
+        )
+        for group in groups
+    ]
 
 
 @dataclass(frozen=True, repr=False, eq=False, kw_only=True)
@@ -214,5 +230,5 @@ def _record(runs: "Sequence[RowRun]", notes: Sequence[Any], table: str) -> dict[
         "rows": runs,
         "failures": [{"row": run.row.number, "name": run.row.name, "cause": run.cause} for run in failures],
         "table": table or None,
-        "notes": list(notes),
+        "notes": [*_dangers(runs), *notes],
     }

@@ -24,7 +24,7 @@ from doe.study_file.table import DONE, FAILED, STATUS
 from rbdyn.base.arrays import Array
 from rbdyn.base.faults import LONGEST_NAME, InputError, key_path, one_line, put_key, read_toml, refuse, set_key
 from rbdyn.base.files import digest_of
-from rbdyn.base.notes import Notes
+from rbdyn.base.notes import DANGER, Notes, of_level
 from rbdyn.base.records import Record, finite
 from rbdyn.base.tables.sheet import InputTable, listed, read_sheet, sheet_of_frame
 from rbdyn.draft.text import tables_of
@@ -191,11 +191,12 @@ class RowFigures(Record):
 
 
 class RowRun(Record):
-    """A row with the figures of its run, or with the ``cause`` of its failure."""
+    """A row with the figures of its run and the dangers that it found, or with the ``cause`` of its failure."""
 
     row: SceneRow
     figures: RowFigures | None = None
     cause: str = ""
+    dangers: Notes = ()
 
     @property
     def status(self) -> str:
@@ -217,6 +218,7 @@ class RowRun(Record):
     def cells(self) -> dict[str, Any]:
         """The row of a file: its keys, then each figure with the half-width of its 95 % interval."""
         cells: dict[str, Any] = {"name": self.row.name, STATUS: self.status, "fault": self.cause or None}
+        cells["danger"] = "; ".join(self.dangers) or None
         cells |= {} if self.row.file is None else {SCENE: str(self.row.file)}
         cells |= {DESIGNATION: self.row.designation} if self.row.designation else {}
         cells |= self.row.values
@@ -230,7 +232,7 @@ class RowRun(Record):
     def as_dict(self) -> dict[str, Any]:
         """The row in the JSON of the command."""
         record: dict[str, Any] = {"row": self.row.number, "name": self.row.name, "status": self.status}
-        record |= {"keys": dict(self.row.values)}
+        record |= {"keys": dict(self.row.values), "dangers": [str(note) for note in self.dangers]}
         if self.figures is not None:
             values, statistical, numerical = (self.figures.numbers_of(kind) for kind in range(3))
             record["figures"] = {
@@ -292,6 +294,6 @@ def _batch(
             # Rows of one kind share the names of their figures.
             keys = tuple(result.responses)
             figures = RowFigures(names.setdefault(keys, keys), arrays_of([*result.responses.values()])[:3])
-            yield RowRun(row, figures)
+            yield RowRun(row, figures, dangers=tuple(of_level(result.notes or (), DANGER)))
         else:
             yield RowRun(row, None, result.cause if isinstance(result, Failure) else faults[row.number])

@@ -6,8 +6,10 @@ import csv
 import json
 import shutil
 import tracemalloc
+from dataclasses import replace
 from pathlib import Path
 
+import instant_runs
 import numpy as np
 import pandas as pd
 import pytest
@@ -19,6 +21,7 @@ import doe as library
 from doe.library.scene_runs import run_answer
 from doe.workflow import scene_table
 from doe.workflow.scene_table import RowFigures, RowRun
+from rbdyn.base.notes import Note
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 HEADER = "name,scene,replicates,seed,cage.pocket_clearance_mm\n"
@@ -236,3 +239,24 @@ def test_a_row_may_begin_with_a_designation(folder, monkeypatch):
     assert "DESIGNATION NU999" in unlisted and "rbdyn ball computes it" in balls
     assert both == "row 3 (c): has a scene and a designation, which both state the bearing; keep one of them"
     assert pd.read_csv("out/runs.csv")["designation"].tolist() == ["NU 210", "NU999", "NU210", "6208"]
+
+
+def test_dangers_of_rows_are_told(folder, monkeypatch):
+    """Command line: a row that runs in danger is done, and its danger is on the screen, in its row and in the notes, once for all rows."""
+    instantly(monkeypatch.setattr)
+    dented = [Note("dent", "inner raceway: 4100 MPa dent it"), Note("fast", "speed: much")]
+    plain = instant_runs.instant_result
+
+    def dangerous(scene, *arguments, **options):
+        result = plain(scene, *arguments, **options)
+        return replace(result, notes=(*dented, *result.notes)) if scene.numerics.seed > 11 else result
+
+    monkeypatch.setattr(instant_runs, "instant_result", dangerous)
+    rows = table("a,,2,11,0.2\nb,,2,12,0.2\nc,,2,13,0.2\n")
+    shown = doe("run", rows, "--scene", "base.toml", "--out", "out", "--json")
+    record, words = json.loads(shown.stdout), "inner raceway: 4100 MPa dent it"
+    assert shown.returncode == 0 and [row["dangers"] for row in record["rows"]] == [[], [words], [words]]
+    assert record["notes"] == [{"level": "danger", "code": "dent", "text": f"{words} (in rows b, c)"}]
+    assert shown.stderr.splitlines()[-1] == f"danger: {words} (in rows b, c)"
+    assert pd.read_csv(record["table"])["danger"].fillna("").tolist() == ["", words, words]
+    assert doe("run", rows, "--scene", "base.toml", "--out", "out").stdout.startswith(f"Danger: {words} (in rows b, c)")
