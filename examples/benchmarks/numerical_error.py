@@ -32,7 +32,7 @@ from rbdyn.dynamics.figures import BEARING
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.parameters.state import light_contact
 from rbdyn.dynamics.recording import run_one
-from rbdyn.dynamics.run import prepare, stiffness_cost, with_numerics
+from rbdyn.dynamics.run import prepare, with_numerics
 from rbdyn.dynamics.statistics.batch_means import student_factor
 from rbdyn.dynamics.statistics.metrics import (
     LEAST_DAMPING,
@@ -177,7 +177,7 @@ def rows_of(case: Case, scene: Scene, truth: dict[str, tuple[float, float]], wor
     """The cells of a scene, and right-hand sides with its companions over those with plain ones."""
     count, others = scene.numerics.replicates, scene.numerics.companions
     runs = replicates(scene, count, None, workers)
-    plan, usual = companions_of(scene, runs, stiffness_cost(runs)["held_by_stability"]), usual_companions(scene)
+    plan, usual = companions_of(scene, runs), usual_companions(scene)
     theirs = replicates(scene, others, plan, workers)
     plain = theirs if plan == usual else replicates(scene, others, usual, workers)
     stated, before = figures_of(runs, theirs, plan.share), figures_of(runs, plain, usual.share)

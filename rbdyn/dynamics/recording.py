@@ -27,7 +27,7 @@ from rbdyn.dynamics.forces.state import CAGE_ANGLE, CAGE_X
 from rbdyn.dynamics.integrators import advance
 from rbdyn.dynamics.parameters.model import pocket_width
 from rbdyn.dynamics.parameters.state import group_of, scales
-from rbdyn.dynamics.run import Run, stiffness_cost, with_numerics
+from rbdyn.dynamics.run import Run, with_numerics
 from rbdyn.dynamics.statistics.error_bars import settled, start_of_counting
 from rbdyn.dynamics.statistics.metrics import Companions, companions_of, filtered_speed, speed_sums
 from rbdyn.dynamics.statistics.replicate import Replicate
@@ -353,7 +353,7 @@ def run_until_settled(
             pace.lengthen(more, numerics.warm_up_turns + longer.turns)
         stage = longer
     notes = (*begin.notes, *length_notes(scene, runs, stage, begin.first))
-    plan = companions_of(scene, runs, stiffness_cost(runs)["held_by_stability"])
+    plan = companions_of(scene, runs)
     if not numerics.companions:
         return Ensemble(runs, [], plan, begin.first, None, begin.turns, notes)
     others = Team(start, range(numerics.companions), plan, workers, Stop(outer=stop), progress, 0, team.ended)

@@ -27,7 +27,7 @@ from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.parameters.validity import heat_notes, limit_notes
 from rbdyn.dynamics.part_figures import part_figures
 from rbdyn.dynamics.recording import run_one
-from rbdyn.dynamics.run import prepare, stiffness_cost
+from rbdyn.dynamics.run import prepare
 from rbdyn.dynamics.simulate import steady_scene
 from rbdyn.dynamics.statistics.error_bars import after_transient, quantities
 from rbdyn.dynamics.statistics.metrics import Companions, companions_of
@@ -193,7 +193,7 @@ class Series:
         if self.waiting or self.faults or not self.remaining:
             return []
         ended = self._ended(None)
-        self.plan = companions_of(self.scene, ended, stiffness_cost(ended)["held_by_stability"])
+        self.plan = companions_of(self.scene, ended)
         self.waiting, self.remaining = self.remaining, 0
         return [Job(self, replicate, self.plan) for replicate in range(self.waiting)]
 

@@ -23,10 +23,9 @@ hurts in slow bearings. Rollers outside the load zone lie on the outer race by t
 it. A method damps this vibration of frequency omega by (h omega)^5/C a radian. C follows from its stability function, for
 which |R(i x)| is 1 - x^6/C (Hairer and Wanner, Solving ODEs II, IV.2). It is 3600 for Dormand and Prince's pair, and 11 500
 for RODAS4, which damps less where x is above 1. Velocity Verlet does not damp a vibration. But at its limit of stability it
-leaves errors in every contact that excite one: at 500 rpm the loss of the bearing of Chen et al. 2022 is 0.4 +- 0.1 % and its
-whirl 4.4 +- 1.3 % too large. In steps of 70 % its loss is right and its whirl 2.8 +- 1.6 % too large. So companions of its runs
-take half of their mean step where stability limits most steps, and d counts. Elastic contacts show no such bias: an NU 210 at 3000 rpm, where stability limits four
-steps of five, has +0.3 +- 1.6, -0.9 +- 0.9 and -0.01 +- 0.04 % (impact, whirl, loss).
+leaves errors in every contact that excite one, and steps of changing size damp one. So runs of slow bearings take even steps
+below that limit (``dynamics.run``), and their companions steps of half that size; d counts. Elastic contacts show no such bias: an
+NU 210 at 3000 rpm, where stability limits four steps of five, has +0.3 +- 1.6, -0.9 +- 0.9 and -0.01 +- 0.04 % (impact, whirl, loss).
 
 This damping matters in comparison with that of the race, which light contacts hardly engage. At 2000 rpm and 4 kN the
 bearing of Chen et al. 2022 has a damping ratio of 4.9e-4 there. Its loss rises with the logarithm of the damping: by 1.5 %
@@ -151,8 +150,6 @@ NOTABLE_DAMPING = 0.2
 LEAST_DAMPING, MOST_DAMPING = 2e-5, 2e-3
 # Tolerance, over that of runs whose steps stability limits, that itself makes the steps short enough.
 TIGHT = 1e-4
-# From this share of steps limited by stability on a run counts as stiff.
-STIFF_SHARE = 0.5
 
 
 class Companions(NamedTuple):
@@ -178,13 +175,13 @@ def usual_companions(scene: Scene) -> Companions:
     return Companions(companion_tolerance(numerics.rtol), numerics.method, math.inf, bias_scale(numerics.rtol))
 
 
-def companions_of(scene: Scene, runs: Sequence[Replicate], held: float) -> Companions:
-    """Companions of these runs, by the steps that they took, of which stability limited the share ``held``."""
+def companions_of(scene: Scene, runs: Sequence[Replicate]) -> Companions:
+    """Companions of these runs, by the steps that they took."""
     light = light_contact(scene)
     if light is None:
         return usual_companions(scene)
     if all(run.method == "verlet" for run in runs):
-        if scene.traction.elasticity or held < STIFF_SHARE:
+        if scene.traction.elasticity:
             return usual_companions(scene)
         return Companions(scene.numerics.rtol, "verlet", 0.5 * mean_step(runs, "verlet"), 1.0)
     damping, method = max(
