@@ -20,7 +20,7 @@ from doe.report.sections import answer, chain, design, duty, fit, front, unknown
 from doe.report.sections.answer import tolerance_of
 from doe.report.sections.design import failure_table
 from doe.report.sections.front import fronts, picks
-from doe.report.summary import Summary, readable, record_table
+from doe.report.summary import Summary, readable
 from doe.workflow.front_record import EstimatedPoint, Point, RobustPoint
 from doe.workflow.problem import Asked, Factor, Response
 from rbdyn.base import html
@@ -234,7 +234,10 @@ def settings(summary: Summary) -> Section:
         "Versions": summary.versions,
         "Cost, times in seconds": summary.cost,
     }
-    blocks = [record_table(caption, figures) for caption, figures in tables.items()]
+    blocks = [
+        Table(caption, ("", "value"), [(label(name), shown(value)) for name, value in figures.items()])
+        for caption, figures in tables.items()
+    ]
     return Section("settings", "Settings, versions, cost", blocks)
 
 

@@ -5,13 +5,12 @@ Every page, screen and table of a study reads it. Names and plain numbers are wr
 
 import math
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
 from doe.dimension_chain import ChainResult
 from doe.pareto.manufacture import Interval, percent
-from doe.response_surface.adequacy import probability
 from doe.response_surface.statistics import Fits
 from doe.running.store import Cause
 from doe.workflow.confirmation import ConfirmedPoint, Gain, PickLimit, point_words
@@ -29,17 +28,13 @@ from rbdyn.base.blocks import Block, Bullets, Detail, Figures, Heading, Paragrap
 from rbdyn.base.identity import Identity
 from rbdyn.base.notes import Note
 from rbdyn.base.records import Record
-from rbdyn.base.words import improvement, label, quantity, shown
+from rbdyn.base.words import improvement, label, quantity
 
 # Limits by their sense in a record.
 SENSES = {"<=": "≤", ">=": "≥"}
 VERDICTS = {"better": "▲ better", "worse": "▼ worse", "within error": "● within error"}
 SIGNS_NOTE = "▲ better, ▼ worse, ● within its 95 % error."
 LIMITS = {"kept": "✓ met", "broken": "✗ violated", "undecided": "? undecided"}
-# Characters above which a value is a sentence, which may take several lines.
-LONG = 40
-# The efficiencies of a design are named by a capital letter.
-EFFICIENCY = re.compile(r"^efficiency \[%\], ([adgi])$")
 
 
 class Summary(Record, kw_only=True):
@@ -85,25 +80,6 @@ class Summary(Record, kw_only=True):
     tolerances_gains: dict[str, KeptGain] | None = None
     tolerances_sentence: str | None = None
     tolerances_warning: str | None = None
-
-
-def scalars(record: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, str]]:
-    """Names and values of everything in nested tables; lists as one value."""
-    for key, value in record.items():
-        name = prefix + label(key)
-        if isinstance(value, Mapping):
-            yield from scalars(value, f"{name}, ")
-        elif not (isinstance(value, list) and value and isinstance(value[0], dict | list)):
-            text = probability(value) if key == "p" else shown(value)
-            if text or value in ("", []):
-                yield EFFICIENCY.sub(lambda match: f"{match[1].upper()}-efficiency [%]", name), text
-
-
-def record_table(caption: str, record: Mapping[str, Any] | None, folded: bool = False) -> Table:
-    """Everything in nested tables, a row for each value."""
-    rows = list(scalars(record or {}))
-    prose = (1,) if any(len(value) > LONG for _, value in rows) else ()
-    return Table(caption, ("", "value"), rows, folded=folded, text_columns=prose)
 
 
 def by_point(

@@ -31,8 +31,8 @@ from doe.workflow.runs import Runs, read_runs
 from rbdyn.base.arrays import Array, Rows, Whole, one_thread
 from rbdyn.base.faults import InputError, MethodError, refuse
 from rbdyn.base.notes import Note, Notes
-from rbdyn.base.records import Record, derived, keyed, outside_json
-from rbdyn.base.words import are, error_alone, improvement, quantity
+from rbdyn.base.records import Record, derived, outside_json
+from rbdyn.base.words import are, improvement, quantity
 
 # Runs with which a Gaussian process takes some 10 s; with 1000 it took 3 s, with 3000 45 s and 0.9 GB.
 MOST_RIVALLED = 1500
@@ -449,24 +449,17 @@ def gain_verdict(percent: float, error: float) -> str:
 
 
 class PredictedGain(Record):
-    """Improvement [%] of a mean response over the baseline, with two 95 % half widths [%].
+    """Improvement [%] of a mean response over the baseline, with its 95 % half width [%].
 
     ``error_percent`` is that of the difference of the two predictions, in which common errors cancel: the contrast c'Vc and the
-    model error at both points, with the degrees of freedom of `Surface.interval_dof`.
-
-    ``scatter``: by how much two single runs at one point differ, by the pure error of replicates. ``within_scatter``:
-    whether the gain is no larger. Both are None if no run is repeated. ``selection_optimism_percent``: by how much the choice of
-    the pick exaggerates the gain.
+    model error at both points, with the degrees of freedom of `Surface.interval_dof`. ``selection_optimism_percent``: by how much
+    the choice of the pick exaggerates the gain.
     """
 
     percent: float
     error_percent: float
     verdict: str = derived(lambda self: gain_verdict(self.percent, self.error_percent))
-    scatter: float | None = keyed("single_run_scatter_percent")
     goal: str = "min"
-    within_scatter: bool | None = derived(
-        lambda self: None if self.scatter is None else abs(self.percent) <= self.scatter, "within_single_run_scatter"
-    )
     selection_optimism_percent: float | None = None
     response: str = outside_json(default="")
     baseline: float = outside_json(default=math.nan)
@@ -482,11 +475,7 @@ class PredictedGain(Record):
             "better": "which is more than its error",
             "worse": "a loss that is more than its error",
         }[self.verdict]
-        if self.scatter is None:
-            return f"{change}, {verdict}."
-        scatter = f"{error_alone(self.scatter)} %"
-        side = "inside" if self.within_scatter else "outside"
-        return f"{change}, {verdict} and {side} the scatter of single runs ({scatter})."
+        return f"{change}, {verdict}."
 
 
 def predicted_gains(study: Problem, point: Array) -> list[PredictedGain]:
@@ -504,11 +493,6 @@ def predicted_gains(study: Problem, point: Array) -> list[PredictedGain]:
         error = float(stats.t.ppf(0.975, surface.interval_dof)) * math.hypot(
             shared, _model_error_of_difference(surface, coded, rows)
         )
-        pure, scatter = surface.pure_error, None
-        if pure.ms is not None and surface.residual_mean_square > 0.0:
-            constant = surface.terms.index("1")
-            single = math.sqrt(pure.ms * sum(float(row[constant]) ** 2 for row in rows))
-            scatter = float(stats.t.ppf(0.975, pure.df)) * single
         gains.append(
             PredictedGain(
                 response=surface.name,
@@ -516,7 +500,6 @@ def predicted_gains(study: Problem, point: Array) -> list[PredictedGain]:
                 value=float(values[1, index]),
                 percent=float(scale * (costs[0, column] - costs[1, column])),
                 error_percent=error * scale,
-                scatter=None if scatter is None else scatter * scale,
                 goal=study.file.response[index].goal,
             )
         )
@@ -545,11 +528,9 @@ VERDICT_WORDS = {
 
 
 def statement(gains: Sequence[PredictedGain]) -> str:
-    """The verdicts on the gains, in a sentence; a second one names those that single runs would hide."""
+    """The verdicts on the gains, in a sentence."""
     parts = []
     for verdict, words in VERDICT_WORDS.items():
         names = [gain.response for gain in gains if gain.verdict == verdict]
         parts += [f"{words}: {', '.join(names)}"] if names else []
-    hidden = [gain.response for gain in gains if gain.within_scatter]
-    tail = f" Single runs would not show the change of {', '.join(hidden)}." if hidden else ""
-    return f"On the surfaces, {'; '.join(parts)}.{tail}"
+    return f"On the surfaces, {'; '.join(parts)}."

@@ -40,7 +40,7 @@ def test_point_is_judged_beside_the_front(tmp_path):
     study = edited_study(tmp_path)
     shown = command(study, "--point", "0.017,0.187,0.285")
     assert shown.exit_code == 0, shown.output
-    assert "the stated point" in shown.output and "inside the scatter of single runs" in shown.output
+    assert "the stated point" in shown.output and "which is within its error" in shown.output
     assert "dominates the baseline with probability" in " ".join(shown.output.split())
     by_name = "pocket_clearance_mm=0.285, radial_clearance_mm=0.017,guide_clearance_mm=0.187"
     record = json.loads(command(study, "--point", by_name, "--json").output)

@@ -181,7 +181,7 @@ def summary() -> dict[str, Any]:
             "hypervolume": 0.9, "largest_hypervolume": 1.331, "hypervolume_history": [0.7, 0.85, 0.9], "ideal": {}, "nadir": {},
             "pick_dominates_baseline": {"probability": 0.9, "standard_error": 0.01, "draws": 1000},
             "predicted_gains": {
-                name: {**VERDICT, "single_run_scatter_percent": None, "goal": "min"} for name in RESPONSES
+                name: {**VERDICT, "goal": "min"} for name in RESPONSES
             },
             "statement": "", "archive": 12, "feasible_share": 1.0, "evaluations": 300, "generations": 3, "seed": 1,
             "constraints": [{"response": "power_loss_W", "sense": "<=", "limit": 260.0, "value": 230.0, "error": None, "kept": True,

@@ -16,7 +16,7 @@ from rbdyn.base.blocks import Detail, Paragraph, Table
 
 IMPACT, WHIRL, POWER = RESPONSES
 GAIN = {"percent": 11.16, "error_percent": 0.65, "goal": "min", "verdict": "better"}
-COST = {**GAIN, "percent": 0.5, "verdict": "within error", "single_run_scatter_percent": None}
+COST = {**GAIN, "percent": 0.5, "verdict": "within error"}
 
 
 def quantity(value: float) -> dict:

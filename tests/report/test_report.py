@@ -24,7 +24,7 @@ from doe.report.sections.chain import yield_words
 from doe.report.sections.fit import _coefficient
 from doe.report.sections.front_pictures import error_bars
 from doe.report.still import Still
-from doe.report.summary import Summary, change, scalars
+from doe.report.summary import Summary, change
 from doe.unknown.decision import GainChances
 from doe.unknown.propagation import Share
 from doe.workflow.confirmation import Gain
@@ -287,7 +287,6 @@ def test_names_and_numbers_are_written_for_people():
         "", "yes", "3", "24000", "1.235e-05", "", "0.1, 2",
     ]  # fmt: skip
     assert shown(-3.1e-17) == "0"
-    assert dict(scalars({"known": {"p": 5.6e-102, "df": 3}})) == {"known, p": "< 0.0001", "known, df": "3"}
     assert _coefficient(-6.986e-05, 0.0086) == "-0.0001 ± 0.0086" and _coefficient(None, None) == "–"
     assert change(Gain(9.963, 4.462)) == "10.0 ± 4.5 % less"
     assert change(Gain(-3.0, 0.5, "max")) == "3.00 ± 0.50 % less"

@@ -60,19 +60,14 @@ def test_gain_of_the_published_pick_is_that_of_statsmodels(table):
         assert gain.error_percent == pytest.approx((low - high) / 2.0, rel=1e-6)
 
 
-def test_promise_of_the_published_pick_is_less_than_claimed_and_hidden_in_single_runs(table):
+def test_promise_of_the_published_pick_is_less_than_claimed(table):
     study, surfaces = table[0], of_the_textbook(table[1])
     impact, whirl, power = predicted_gains(study.with_surfaces(surfaces), PAPER_PICK)
     # Table 8 claims 9.26, 2.87 and 1.45 %, of one run at the centre and a value that eq 22 does not give (193.2).
     assert impact.percent == pytest.approx(5.27, abs=0.01) and impact.error_percent == pytest.approx(4.17, abs=0.01)
     assert whirl.percent == pytest.approx(2.54, abs=0.01) and power.percent == pytest.approx(0.75, abs=0.01)
     assert [gain.verdict for gain in (impact, whirl, power)] == ["better", "better", "within error"]
-    # Two of the centre runs differ by more than that: pure error of six runs, 5 degrees of freedom.
-    centre = pd.read_csv(TABLE)["impact_force_N"].iloc[[6, 9, 10, 11, 14, 15]]
-    assert impact.scatter == pytest.approx(2.5706 * np.sqrt(2.0) * centre.std() / 203.7 * 100.0, rel=1e-3)
-    assert all(gain.within_scatter for gain in (impact, whirl, power))
-    assert "inside the scatter of single runs" in impact.sentence
-    assert statement([impact, whirl, power]).count("impact_force_N") == 2
+    assert statement([impact, whirl, power]).count("impact_force_N") == 1
 
 
 def test_gain_of_the_baseline_over_itself_is_nothing_without_error(table):

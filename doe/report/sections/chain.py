@@ -10,7 +10,7 @@ from doe.dimension_chain.links import ESTIMATED, size_text
 from doe.dimension_chain.solution import AllocatedSize, PartSize
 from doe.dimension_chain.yields import SelectiveAssembly
 from doe.report.still import COLOURS, FONT, Still, name_marks
-from doe.report.summary import Summary, record_table
+from doe.report.summary import Summary
 from rbdyn.base.blocks import (
     Block,
     Column,
@@ -45,14 +45,12 @@ DRAWN: Column[SizeRow] = Column("", words="size [mm]", cell=lambda row: row[2].d
 
 
 def chains(summary: Summary) -> Section:
-    """Of each chain a stacked bar of contributions, the yields by distribution and all other figures."""
+    """Of each chain a stacked bar of contributions, and all its figures."""
     blocks: list[Block] = []
     for name, chain in summary.chains.items():
         caption = "Contribution of each part to the scatter of the closing link."
         blocks += [Heading(label(name)), Figures([contributions(name, chain.contributions).svg], caption)]
         blocks += chain_blocks(name, chain)
-        results = {"normal_yield": chain.normal_yield, "seed": chain.seed}
-        blocks.append(record_table(f"Further results of the chain {label(name)}", results, folded=True))
     return Section("chains", "Dimension chains", blocks)
 
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from doe.designs.model import Evaluation, Shell
 from doe.report.still import GUIDE, Point, Still
-from doe.report.summary import Summary, record_table
+from doe.report.summary import Summary
 from doe.running.store import Cause
 from doe.workflow.design import DesignResult, DesignRun, StandardRun
 from doe.workflow.problem import Asked
@@ -101,13 +101,9 @@ def power_sheet(evaluation: Evaluation, columns: tuple[Column[TermQuality], ...]
 
 def _evaluation(evaluation: Evaluation) -> list[Block]:
     """Single figures in one table; figures by term in another; the variances in pictures."""
-    figures = evaluation.as_dict().items()
-    single = {
-        key: value for key, value in figures if key not in ("vif", "power_percent") and not isinstance(value, list)
-    }
     what = "Scaled prediction variance: least, mean and largest by radius"
     return [
-        record_table("Design quality for the chosen models", single),
+        quality_table(evaluation),
         power_sheet(evaluation, BY_TERM).block,
         Figures(
             [still.svg for still in evaluation_plots(evaluation)],
@@ -174,19 +170,16 @@ def design_blocks(result: DesignResult) -> list[Block]:
 
 def _evaluation_tables(evaluation: Evaluation) -> list[Block]:
     """Quality of the design for the largest model of the study: as a whole, by term, by radius."""
+    shells = Sheet("Scaled prediction variance by radius", columns_of(Shell), evaluation.by_radius, detail=Detail.ALL)
+    return [quality_table(evaluation), power_sheet(evaluation).block, shells.block]
+
+
+def quality_table(evaluation: Evaluation) -> Table:
+    """Single figures of the quality of a design."""
     region = evaluation.region
     size = f"{'radius' if region.shape == 'ball' else 'half-width'} {region.reach:.4g}"
     model = f"{str(evaluation.model).replace('_', ' ')} model, {counted(len(evaluation.terms), 'term')}"
     title = f"{model}, over the {region.shape} of {size} (coded)"
-    shells = Sheet("Scaled prediction variance by radius", columns_of(Shell), evaluation.by_radius, detail=Detail.ALL)
-    return [
-        Table(title, ("", "value"), _figures(evaluation), text_columns=(1,), detail=Detail.USUAL),
-        power_sheet(evaluation).block,
-        shells.block,
-    ]
-
-
-def _figures(evaluation: Evaluation) -> list[tuple[str, str]]:
     variance, blocks = evaluation.scaled_prediction_variance, evaluation.blocks
     freedom, letters = evaluation.degrees_of_freedom.items(), evaluation.efficiency_percent.items()
     scaled = f"centre {variance.centre:.2f}, mean {variance.mean:.2f}, max {variance.max:.2f}"
@@ -201,4 +194,4 @@ def _figures(evaluation: Evaluation) -> list[tuple[str, str]]:
     if blocks is not None:
         relation = "orthogonal" if blocks.orthogonal else "not orthogonal"
         rows.append(("blocks", f"{relation} to the terms (largest cosine {blocks.largest_cosine:.3f})"))
-    return rows
+    return Table(title, ("", "value"), rows, text_columns=(1,), detail=Detail.USUAL)

@@ -1,6 +1,6 @@
 """The fits: response surfaces, their statistics and pictures, and their tables."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from statistics import NormalDist
@@ -8,7 +8,7 @@ from string import ascii_uppercase
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from doe.report.still import GUIDE, Point, Still, name_marks
-from doe.report.summary import Summary, record_table
+from doe.report.summary import Summary
 from doe.response_surface.adequacy import AnovaRow, RunDiagnostics, probability
 from doe.response_surface.statistics import Fit, Term
 from doe.workflow.problem import Factor
@@ -26,8 +26,7 @@ from rbdyn.base.blocks import (
     Widget,
     columns_of,
 )
-from rbdyn.base.records import plain
-from rbdyn.base.words import counted, label, quantity, shown, with_error
+from rbdyn.base.words import label, quantity, shown, with_error
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -59,7 +58,6 @@ QUALITY: tuple[Column[Fit], ...] = (
     Column("adequate_precision", words="adequate precision"),
     Column("", probability, "p of lack of fit", at=("lack_of_fit", "p")),
 )
-STATISTICS = QUALITY[2:-1]
 TERM_COLUMNS = columns_of(Term)
 # On the screen the test of a coefficient follows its interval.
 TESTED: tuple[Column[Term], ...] = (Column("", 5, "t", at="t"), Column("", probability, "p", at="p"), SIGNIFICANCE)
@@ -117,17 +115,16 @@ def _coefficient(value: float | None, error: float | None) -> str:
 
 def diagnostics(summary: Summary) -> Section:
     """Analysis of variance with its sentences, and pictures of the residuals, response by response."""
-    fits = list(summary.fit.responses.values())
-    blocks: list[Block] = [Sheet("Quality of the fits", QUALITY, fits).block]
-    return Section("diagnostics", "Diagnostics", blocks + fit_blocks(fits, summary.asked.columns))
+    return Section("diagnostics", "Diagnostics", fit_blocks([*summary.fit.responses.values()], summary.asked.columns))
 
 
-def fit_blocks(fits: Iterable[Fit], factors: Sequence[str] = ()) -> list[Block]:
-    """Of each fit analysis of variance, coefficients, equations and sentences on them; at full detail also every run.
+def fit_blocks(fits: Sequence[Fit], factors: Sequence[str] = ()) -> list[Block]:
+    """Quality of the fits; of each analysis of variance, coefficients, equations and sentences on them; at full detail also every run.
 
     factors : names of those behind the letters of the terms.
     """
-    return [block for fit in fits for block in _fit_blocks(fit, factors)]
+    quality = Sheet("Quality of the fits", QUALITY, fits, detail=Detail.USUAL).block
+    return [quality, *(block for fit in fits for block in _fit_blocks(fit, factors))]
 
 
 def _fit_blocks(fit: Fit, factors: Sequence[str]) -> list[Block]:
@@ -135,22 +132,15 @@ def _fit_blocks(fit: Fit, factors: Sequence[str]) -> list[Block]:
     sentences = [sentence.removeprefix(f"{fit.name}: ") for sentence in fit.sentences]
     runs = fit.diagnostics.runs
     caption = "Predicted on observed, residuals on predicted, normal plot, Cook's distance on leverage."
-    further = {
-        key: {name: value for name, value in plain(part).items() if name != "sentence"}
-        for key, part in (("box_cox", fit.box_cox), ("blocks", fit.blocks), ("canonical", fit.canonical),
-                          ("known_variance", fit.known_variance), ("rival", fit.rival))
-        if part is not None
-    }  # fmt: skip
     anova, terms, residuals = _sheets(fit)
     return [
         Heading(label(fit.name)),
         anova.block,
         terms.block,
-        *(Paragraph(text, detail=Detail.USUAL) for text in (*_equations(fit, factors), _quality(fit))),
+        *(Paragraph(text, detail=Detail.USUAL) for text in _equations(fit, factors)),
         Bullets([text[:1].upper() + text[1:] for text in sentences]),
         Figures([still.svg for still in diagnostic_plots(fit.name, runs)], caption),
         residuals.block,
-        replace(record_table(f"Further results of {label(fit.name)}", further, folded=True), detail=Detail.ALL),
     ]
 
 
@@ -200,14 +190,6 @@ def _equations(fit: Fit, factors: Sequence[str]) -> list[str]:
 
 def _sum(terms: Mapping[str, float]) -> str:
     return " ".join(f"{c:+.5g}{'' if term == '1' else ' ' + term}" for term, c in terms.items())
-
-
-def _quality(fit: Fit) -> str:
-    """Every figure of how well the surface fits, in one sentence."""
-    figures = [(column.heading, column.value(fit)) for column in STATISTICS]
-    freedom = counted(fit.residual_dof, "degree") + " of freedom"
-    deviation = f"residual standard deviation {shown(fit.residual_mean_square**0.5, 5)} on {freedom}"
-    return ", ".join([*(f"{words} {shown(value, 5)}" for words, value in figures if value is not None), deviation])
 
 
 def diagnostic_plots(name: str, runs: Sequence[RunDiagnostics]) -> list[Still]:

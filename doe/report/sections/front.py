@@ -25,18 +25,7 @@ from doe.workflow.problem import Asked, Problem
 from doe.workflow.surfaces import PredictedGain
 from doe.workflow.whole import StudyResult
 from rbdyn.base.blocks import Block, Bullets, Column, Detail, Figures, Heading, Paragraph, Section, Sheet, Table, Widget
-from rbdyn.base.words import (
-    NORMAL,
-    all_of,
-    chance,
-    counted,
-    error_alone,
-    improvement,
-    label,
-    quantity,
-    shown,
-    with_error,
-)
+from rbdyn.base.words import NORMAL, all_of, chance, counted, improvement, label, quantity, shown, with_error
 
 # Points of a front that are drawn; more cannot be told apart.
 MOST_POINTS = 400
@@ -180,12 +169,9 @@ def _picks(caption: str, asked: Asked, marks: Mapping[str, Point], detail: Detai
 
 
 def _gains(caption: str, gains: Mapping[str, PredictedGain]) -> Table:
-    """Gains on the surfaces, and by how much two single runs would differ anyway."""
-    rows = [
-        (label(name), change(gain), gain.verdict, f"{error_alone(gain.scatter)} %" if gain.scatter else "")
-        for name, gain in gains.items()
-    ]
-    return Table(caption, ("response", "change", "verdict", "scatter of two single runs"), rows, text_columns=(2,))
+    """Gains on the surfaces."""
+    rows = [(label(name), change(gain), gain.verdict) for name, gain in gains.items()]
+    return Table(caption, ("response", "change", "verdict"), rows, text_columns=(2,))
 
 
 def _doubt(result: SurfaceFront) -> list[Block]:
