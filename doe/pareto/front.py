@@ -18,29 +18,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import special
 
+from doe.pareto import search
 from doe.pareto.manufacture import ToleranceAware
-from doe.pareto.search import (
-    NAMES,
-    Archive,
-    Barred,
-    Doubt,
-    Goals,
-    InfeasibleError,
-    Judge,
-    Judged,
-    Objectives,
-    Rule,
-    Search,
-    barring,
-    check_search,
-    dominates,
-    growth,
-    hypervolume,
-    knee_depth,
-    pick_all,
-    search,
-    thinning,
-)
 from rbdyn.base.arrays import Array, Mask
 from rbdyn.base.faults import MethodError
 from rbdyn.base.records import Record
@@ -104,7 +83,7 @@ def non_dominated_share(costs: Array) -> Array:
 
 
 def front_uncertainty(
-    responses: Array, goals: Goals, values: Array, pick: int, rule: Rule, baseline: Array, original: Array
+    responses: Array, goals: search.Goals, values: Array, pick: int, rule: search.Rule, baseline: Array, original: Array
 ) -> FrontUncertainty:
     """Uncertainty of a front, from responses on drawn surfaces.
 
@@ -115,14 +94,14 @@ def front_uncertainty(
     baseline, original : responses (d, m) of the baseline on the drawn surfaces and (m,) on the fitted ones.
     """
     costs, base = goals.costs(responses), goals.costs(baseline)
-    wins, error = share(dominates(costs[:, pick], base))
+    wins, error = share(search.dominates(costs[:, pick], base))
     real = goals.costs(original) - goals.costs(values)
     optimism = selection_optimism(costs[:SELECTIONS], base[:SELECTIONS], real, goals, rule)
     dominance = Dominance(float(wins), float(error), len(responses))
     return FrontUncertainty(non_dominated_share(costs), dominance, optimism)
 
 
-def selection_optimism(costs: Array, baseline: Array, real: Array, goals: Goals, rule: Rule) -> Array:
+def selection_optimism(costs: Array, baseline: Array, real: Array, goals: search.Goals, rule: search.Rule) -> Array:
     """Mean excess (q,) of the predicted gain at a rule's pick over the real gain, by parametric bootstrap.
 
     The fitted surfaces represent the truth and drawn ones the fit: ``costs`` (d, f, q) and ``baseline`` (d, q) are of draws,
@@ -130,7 +109,7 @@ def selection_optimism(costs: Array, baseline: Array, real: Array, goals: Goals,
     """
     excess = []
     for draw, base in zip(costs, baseline, strict=True):
-        row = pick_all(draw, goals, base)[0][rule]
+        row = search.pick_all(draw, goals, base)[0][rule]
         excess.append(base - draw[row] - real[row])
     return np.mean(excess, axis=0)
 
@@ -165,7 +144,7 @@ class ParetoFront(Record, eq=False):
     nadir: Array
     knee: int
     pick: int
-    picks: dict[Rule, int]
+    picks: dict[search.Rule, int]
     pick_reason: str
     baseline_values: Array | None
     archive_size: int
@@ -173,7 +152,7 @@ class ParetoFront(Record, eq=False):
     feasible: float
     generations: int
     seed: int
-    goals: Goals
+    goals: search.Goals
     uncertainty: FrontUncertainty | None = None
     tolerance_aware: ToleranceAware | None = None
     violations: Array | None = None
@@ -181,20 +160,20 @@ class ParetoFront(Record, eq=False):
 
 
 def front(
-    objectives: Objectives,
+    objectives: search.Objectives,
     lower: ArrayLike,
     upper: ArrayLike,
     *,
-    goals: Goals | None = None,
+    goals: search.Goals | None = None,
     population: int = 100,
     generations: int = 200,
     seed: int = 1,
     baseline: ArrayLike | None = None,
     keep: int = 200,
-    pick: Rule = "knee",
-    doubt: Doubt | None = None,
+    pick: search.Rule = "knee",
+    doubt: search.Doubt | None = None,
     closest: bool = False,
-    barred: Barred | None = None,
+    barred: search.Barred | None = None,
 ) -> ParetoFront:
     """Find the Pareto front of responses over a box; the same seed gives the same bits.
 
@@ -214,20 +193,20 @@ def front(
     when no evaluated point keeps all limits, unless the ``closest`` is asked for.
     """
     low, high = np.asarray(lower, float), np.asarray(upper, float)
-    check_search(low, high, population, generations, keep)
+    search.check_search(low, high, population, generations, keep)
     if baseline is not None and np.shape(baseline) != low.shape:
         raise MethodError(f"baseline has shape {np.shape(baseline)}; give one value a factor ({low.size})")
     if goals is None:
-        goals = Goals.of(["min"] * _values(objectives, (low + high)[None, :] / 2).shape[1])
-    judge = barring(partial(_judged, objectives, goals, doubt), barred)
+        goals = search.Goals.of(["min"] * _values(objectives, (low + high)[None, :] / 2).shape[1])
+    judge = search.barring(partial(_judged, objectives, goals, doubt), barred)
     searched, violations = _searched(judge, low, high, population, generations, seed, closest)
     points, costs = searched.archive
     ideal, nadir = costs.min(axis=0), costs.max(axis=0)
-    history = growth([found.costs for found in searched.generations], ideal, nadir)
+    history = search.growth([found.costs for found in searched.generations], ideal, nadir)
     baseline_values = None if baseline is None else _values(objectives, np.atleast_2d(baseline))[0]
     baseline_costs = None if baseline_values is None else goals.costs(baseline_values)
-    best = int(knee_depth(costs).argmax())
-    rows, picks, among = thinning(costs, goals, baseline_costs, keep, [best])
+    best = int(search.knee_depth(costs).argmax())
+    rows, picks, among = search.thinning(costs, goals, baseline_costs, keep, [best])
     return ParetoFront(
         points=points[rows],
         values=_values(objectives, points[rows]),
@@ -239,7 +218,7 @@ def front(
         knee=int(np.searchsorted(rows, best)),
         pick=picks[pick],
         picks=picks,
-        pick_reason=f"{NAMES[pick]} {among}",
+        pick_reason=f"{search.NAMES[pick]} {among}",
         baseline_values=baseline_values,
         archive_size=len(costs),
         evaluations=searched.evaluations,
@@ -252,25 +231,27 @@ def front(
 
 
 def _searched(
-    judge: Judge, low: Array, high: Array, population: int, generations: int, seed: int, closest: bool
-) -> tuple[Search, Array | None]:
+    judge: search.Judge, low: Array, high: Array, population: int, generations: int, seed: int, closest: bool
+) -> tuple[search.Search, Array | None]:
     """The search; where no point keeps all limits and the ``closest`` is asked for, that point with its excess (c,) over each."""
     try:
-        return search(judge, low, high, population, generations, seed), None
-    except InfeasibleError as error:
+        return search.search(judge, low, high, population, generations, seed), None
+    except search.InfeasibleError as error:
         if not closest:
             raise
-        archive = Archive(error.point[None], judge(error.point[None]).costs)
-        return Search([archive], population * generations, 0.0), error.violations
+        archive = search.Archive(error.point[None], judge(error.point[None]).costs)
+        return search.Search([archive], population * generations, 0.0), error.violations
 
 
-def _judged(objectives: Objectives, goals: Goals, doubt: Doubt | None, points: Array) -> Judged:
+def _judged(
+    objectives: search.Objectives, goals: search.Goals, doubt: search.Doubt | None, points: Array
+) -> search.Judged:
     values = _values(objectives, points)
     below, above = (0.0, 0.0) if doubt is None else doubt(points)
-    return Judged(goals.costs(values), goals.violations(values - below, values + above))
+    return search.Judged(goals.costs(values), goals.violations(values - below, values + above))
 
 
-def _values(objectives: Objectives, points: Array) -> Array:
+def _values(objectives: search.Objectives, points: Array) -> Array:
     """Responses (n, m) of points. Raises MethodError unless they are finite, one row a point, with two or more columns."""
     values = np.asarray(objectives(points), float)
     if values.ndim != 2 or len(values) != len(points) or values.shape[1] < 2:
@@ -324,7 +305,7 @@ class SimulatedFront(Record, eq=False):
     pick_reason: str
     baseline_values: Array | None
     seed: int
-    goals: Goals
+    goals: search.Goals
     searched: Samples
     freedom: Array | None = None
 
@@ -368,6 +349,8 @@ def noisy_hypervolume(
     subtracted (parametric bootstrap: Efron and Tibshirani, An Introduction to the Bootstrap, section 10.6).
     """
     random = np.random.default_rng(seed)
-    believed = hypervolume(costs, ideal, nadir)
-    noisy = [hypervolume(costs + errors * random.standard_normal(costs.shape), ideal, nadir) for _ in range(draws)]
+    believed = search.hypervolume(costs, ideal, nadir)
+    noisy = [
+        search.hypervolume(costs + errors * random.standard_normal(costs.shape), ideal, nadir) for _ in range(draws)
+    ]
     return 2.0 * believed - float(np.mean(noisy)), float(np.std(noisy, ddof=1))

@@ -27,22 +27,7 @@ import numpy as np
 from scipy import special
 from scipy.stats import norm, qmc
 
-from doe.pareto.search import (
-    NAMES,
-    Archive,
-    Barred,
-    Doubt,
-    Goals,
-    Judged,
-    Rule,
-    barring,
-    check_search,
-    columns_of,
-    dominates,
-    hypervolume,
-    search,
-    thinning,
-)
+from doe.pareto import search
 from rbdyn.base.arrays import Array
 from rbdyn.base.estimate import LEVEL
 from rbdyn.base.records import Record
@@ -244,27 +229,29 @@ class ToleranceBox(Record, eq=False):
     distribution: Distribution = "normal"
     samples: int = 256
 
-    def judge(self, surfaces: Sequence[Quadratic], goals: Goals, points: Array, doubt: Doubt | None = None) -> Judged:
+    def judge(
+        self, surfaces: Sequence[Quadratic], goals: search.Goals, points: Array, doubt: search.Doubt | None = None
+    ) -> search.Judged:
         """Robust costs (n, q) and violations (n, c) of coded points (n, k); limits must hold within the ``doubt``."""
         below, above = (0.0, 0.0) if doubt is None else doubt(points)
         if self.kind == "worst_case":
             pairs = [surface.range_over_box(points, self.half) for surface in surfaces]
             low, high = (np.column_stack(part) for part in zip(*pairs, strict=True))
-            return Judged(goals.worst(low, high), goals.violations(low - below, high + above))
+            return search.Judged(goals.worst(low, high), goals.violations(low - below, high + above))
         return self.judge_parts(self.parts(surfaces, points), goals, below, above)
 
     def judge_parts(
-        self, values: Array, goals: Goals, below: Array | float = 0.0, above: Array | float = 0.0
-    ) -> Judged:
+        self, values: Array, goals: search.Goals, below: Array | float = 0.0, above: Array | float = 0.0
+    ) -> search.Judged:
         """Robust costs (n, q) and violations (n, c) from the responses (n, s, m) of parts, of the worst part or a quantile."""
         share = 1.0 if self.kind == "worst_case" else self.quantile
         costs = np.quantile(goals.costs(values), share, axis=1)
         if not goals.limited:
-            return Judged(costs, np.zeros((*costs.shape[:-1], 0)))
+            return search.Judged(costs, np.zeros((*costs.shape[:-1], 0)))
         low, high = (np.quantile(values, side, axis=1) for side in (1.0 - share, share))
-        return Judged(costs, goals.violations(low - below, high + above))
+        return search.Judged(costs, goals.violations(low - below, high + above))
 
-    def farthest(self, barred: Barred, points: Array) -> Array:
+    def farthest(self, barred: search.Barred, points: Array) -> Array:
         """How far (n,) the farthest corner of the box about each of the points (n, k) lies in what is ``barred``."""
         corners = self.half * np.array(list(product((-1.0, 1.0), repeat=self.half.size)))
         return barred((points[:, None] + corners).reshape(-1, self.half.size)).reshape(len(points), -1).max(axis=1)
@@ -272,7 +259,7 @@ class ToleranceBox(Record, eq=False):
     def parts(self, surfaces: Sequence[Quadratic], points: Array, samples: int | None = None) -> Array:
         """Responses (n, s, m) of parts at coded nominal points (n, k)."""
         offset = self.half * even_offsets(samples or self.samples, self.half.size, self.distribution)
-        return columns_of([surface.around(points, offset) for surface in surfaces])
+        return search.columns_of([surface.around(points, offset) for surface in surfaces])
 
 
 class Survival(Record):
@@ -302,7 +289,7 @@ class ToleranceAware(Record, eq=False):
     points: Array
     costs: Array
     values: Array
-    picks: dict[Rule, int]
+    picks: dict[search.Rule, int]
     pick: int
     pick_reason: str
     baseline_costs: Array
@@ -318,18 +305,18 @@ def tolerance_aware_front(
     box: ToleranceBox,
     lower: Array,
     upper: Array,
-    goals: Goals,
+    goals: search.Goals,
     *,
     baseline: Array,
-    plain: Archive,
+    plain: search.Archive,
     plain_pick: int,
     population: int = 100,
     generations: int = 200,
     seed: int = 1,
     keep: int = 200,
-    pick: Rule = "knee",
-    doubt: Doubt | None = None,
-    barred: Barred | None = None,
+    pick: search.Rule = "knee",
+    doubt: search.Doubt | None = None,
+    barred: search.Barred | None = None,
 ) -> ToleranceAware:
     """NSGA-II on robust costs, and the comparison with the plain front; the same seed gives the same bits.
 
@@ -345,23 +332,25 @@ def tolerance_aware_front(
 
     Raises ValueError when a setting of the search is impossible; InfeasibleError when no point keeps all limits.
     """
-    check_search(lower, upper, population, generations, keep)
+    search.check_search(lower, upper, population, generations, keep)
     judge = partial(box.judge, surfaces, goals)
     barred_parts = None if barred is None else partial(box.farthest, barred)
-    searched = search(barring(partial(judge, doubt=doubt), barred_parts), lower, upper, population, generations, seed)
+    searched = search.search(
+        search.barring(partial(judge, doubt=doubt), barred_parts), lower, upper, population, generations, seed
+    )
     points, costs = searched.archive
     nominal_baseline = goals.costs(_nominal(surfaces, baseline[None]))[0]
     baseline_costs = judge(baseline[None]).costs[0]
-    survives_nominal = bool(dominates(costs, nominal_baseline).any())
-    rows, picks, among = thinning(costs, goals, nominal_baseline if survives_nominal else baseline_costs, keep)
+    survives_nominal = bool(search.dominates(costs, nominal_baseline).any())
+    rows, picks, among = search.thinning(costs, goals, nominal_baseline if survives_nominal else baseline_costs, keep)
     values = _nominal(surfaces, points[rows])
     robust_plain = judge(plain.points).costs
     spans, robust_spans = ((front.min(axis=0), front.max(axis=0)) for front in (plain.costs, costs))
-    losing = hypervolume(goals.costs(values), *spans), hypervolume(plain.costs, *spans)
-    gaining = hypervolume(costs[rows], *robust_spans), hypervolume(robust_plain, *robust_spans)
+    losing = search.hypervolume(goals.costs(values), *spans), search.hypervolume(plain.costs, *spans)
+    gaining = search.hypervolume(costs[rows], *robust_spans), search.hypervolume(robust_plain, *robust_spans)
     candidates = np.vstack([plain.points[plain_pick], points[rows[picks[pick]]]])
     part_costs = goals.costs(box.parts(surfaces, candidates, SURVIVAL_PARTS))
-    survives = np.mean(dominates(part_costs, nominal_baseline), axis=1).tolist()
+    survives = np.mean(search.dominates(part_costs, nominal_baseline), axis=1).tolist()
     error = max(error_of_share(share, SURVIVAL_PARTS) for share in survives)
     return ToleranceAware(
         box=box,
@@ -370,9 +359,10 @@ def tolerance_aware_front(
         values=values,
         picks=picks,
         pick=picks[pick],
-        pick_reason=f"{NAMES[pick]} {among}" + (" also at the ends of their tolerances" if survives_nominal else ""),
+        pick_reason=f"{search.NAMES[pick]} {among}"
+        + (" also at the ends of their tolerances" if survives_nominal else ""),
         baseline_costs=baseline_costs,
-        hypervolume=hypervolume(costs, *robust_spans),
+        hypervolume=search.hypervolume(costs, *robust_spans),
         # No nominal point is better than the plain front but by what that search missed.
         nominal_loss_percent=100.0 * max(1.0 - losing[0] / losing[1], 0.0) if losing[1] > 0.0 else 0.0,
         robust_gain_percent=100.0 * (gaining[0] / gaining[1] - 1.0) if gaining[1] > 0.0 else np.inf,

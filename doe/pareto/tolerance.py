@@ -15,18 +15,7 @@ from typing import Self
 
 import numpy as np
 
-from doe.pareto.manufacture import (
-    SURVIVAL_PARTS,
-    Distribution,
-    Interval,
-    Quadratic,
-    ToleranceBox,
-    error_of_share,
-    even_offsets,
-    interval_of_share,
-    percent,
-    random_offsets,
-)
+from doe.pareto import manufacture
 from doe.pareto.search import NAMES, Goals, Rule, dominates, non_dominated, pick_all
 from rbdyn.base.arrays import Array, Mask, Rows
 from rbdyn.base.faults import MethodError
@@ -53,7 +42,7 @@ class WidestTolerances(Record, eq=False):
     half_widths: Array
     probability: float
     standard_error: float
-    interval: Interval
+    interval: manufacture.Interval
     limited_by: str
     at_rim: Mask
     sentence: str
@@ -86,7 +75,7 @@ class Parts(Record, eq=False, kw_only=True):
     upper: Array
     names: Sequence[str]
     probability: float = 0.95
-    distribution: Distribution = "normal"
+    distribution: manufacture.Distribution = "normal"
     samples: int = 4096
     seed: int = 1
     promise: str = "meet all limits"
@@ -125,7 +114,7 @@ class Parts(Record, eq=False, kw_only=True):
     @cached_property
     def offsets(self) -> Array:
         """Offsets (samples, k) of the parts, in half widths."""
-        return random_offsets(self.samples, self.centre.size, self.distribution, self.seed)
+        return manufacture.random_offsets(self.samples, self.centre.size, self.distribution, self.seed)
 
     @property
     def percent(self) -> str:
@@ -140,12 +129,12 @@ class Parts(Record, eq=False, kw_only=True):
         """Share of the parts that keep all limits."""
         return float(self.keep(half).all(axis=1).mean())
 
-    def interval(self, half: Array, share: float) -> Interval:
+    def interval(self, half: Array, share: float) -> manufacture.Interval:
         """Interval of the share of parts that keep all limits, which is ``share`` on the mean surfaces."""
         if self.count_on_draws is None:
-            return interval_of_share(np.array([self.keep(half).all(axis=1).sum()]), len(self.offsets))
+            return manufacture.interval_of_share(np.array([self.keep(half).all(axis=1).sum()]), len(self.offsets))
         some = self.offsets[:MOST_JUDGED]
-        interval = interval_of_share(self.count_on_draws(self.centre + half * some), len(some))
+        interval = manufacture.interval_of_share(self.count_on_draws(self.centre + half * some), len(some))
         return interval.containing(share)
 
     def most_broken(self, half: Array) -> str:
@@ -176,7 +165,7 @@ class Parts(Record, eq=False, kw_only=True):
         """Result without any tolerance, because of a limit."""
         zero, share = np.zeros_like(self.centre), self.share(np.zeros_like(self.centre))
         sentence = f"No tolerance is possible: {cause}; require less of the gain or a lower probability."
-        error = error_of_share(share, len(self.offsets))
+        error = manufacture.error_of_share(share, len(self.offsets))
         return WidestTolerances(zero, share, error, self.interval(zero, share), limit, zero.astype(bool), sentence)
 
     def _within(self, scale: float, ratios: Array) -> WidestTolerances:
@@ -190,8 +179,8 @@ class Parts(Record, eq=False, kw_only=True):
         # The limit that most parts break just beyond is the limiting one.
         limit = RIM if at_rim.all() else self.most_broken(self.half(ratios, scale * 1.02))
         share = self.share(half)
-        error, interval = error_of_share(share, len(self.offsets)), self.interval(half, share)
-        within = f"Within these tolerances {percent(share)} % ({interval.words}) of the parts {self.promise}; {self.percent} are required."
+        error, interval = manufacture.error_of_share(share, len(self.offsets)), self.interval(half, share)
+        within = f"Within these tolerances {manufacture.percent(share)} % ({interval.words}) of the parts {self.promise}; {self.percent} are required."
         rim = "Where a tolerance ends at the bound of the region, no run shows whether it may be wider."
         sentences = [within, f"These tolerances are limited by {limit}.", self.open_errors, rim if at_rim.any() else ""]
         return WidestTolerances(half, share, error, interval, limit, at_rim, " ".join(filter(None, sentences)))
@@ -204,13 +193,15 @@ HARDLY_VARIED = 0.1  # share of the neighbours' largest spread below which a dir
 class Neighbourhood(Record, eq=False):
     """Surfaces and their local correction by ``slopes`` (n, k, m) about coded points (n, k)."""
 
-    surfaces: Sequence[Quadratic]
+    surfaces: Sequence[manufacture.Quadratic]
     points: Array
     values: Array
     slopes: Array
 
     @classmethod
-    def of(cls, surfaces: Sequence[Quadratic], points: Array, values: Array, runs: Array, responses: Array) -> Self:
+    def of(
+        cls, surfaces: Sequence[manufacture.Quadratic], points: Array, values: Array, runs: Array, responses: Array
+    ) -> Self:
         """Neighbourhood of coded points (n, k) with responses (n, m), by the search's ``runs`` (a, k) and ``responses`` (a, m)."""
         good = np.isfinite(responses).all(axis=1)
         runs, responses = runs[good], responses[good]
@@ -239,7 +230,12 @@ class SimulatedAware(Record, eq=False):
 
 
 def simulated_aware(
-    box: ToleranceBox, here: Neighbourhood, goals: Goals, baseline: Neighbourhood | None, below: Array, above: Array
+    box: manufacture.ToleranceBox,
+    here: Neighbourhood,
+    goals: Goals,
+    baseline: Neighbourhood | None,
+    below: Array,
+    above: Array,
 ) -> SimulatedAware:
     """Robust costs of points; limits must hold for responses lower by ``below`` and higher by ``above`` (n, m)."""
     offsets = _offsets(box)
@@ -247,7 +243,7 @@ def simulated_aware(
     if baseline is None:
         return SimulatedAware(judged.costs, judged.violations)
     nominal = goals.costs(baseline.values)[0]
-    survival_offsets = box.half * even_offsets(SURVIVAL_PARTS, box.half.size, box.distribution)
+    survival_offsets = box.half * manufacture.even_offsets(manufacture.SURVIVAL_PARTS, box.half.size, box.distribution)
     return SimulatedAware(
         costs=judged.costs,
         violations=judged.violations,
@@ -277,9 +273,9 @@ def pick_among(
     return int(rows[picks[rule]]), f"{NAMES[rule]} {among}{limits}"
 
 
-def _offsets(box: ToleranceBox) -> Array:
+def _offsets(box: manufacture.ToleranceBox) -> Array:
     """Offsets (s, k) of the evaluated parts; for the worst case with the corners of the box."""
-    even = box.half * even_offsets(box.samples, box.half.size, box.distribution)
+    even = box.half * manufacture.even_offsets(box.samples, box.half.size, box.distribution)
     if box.kind == "quantile":
         return even
     return np.vstack([even, box.half * np.array(list(product((-1.0, 1.0), repeat=box.half.size)))])

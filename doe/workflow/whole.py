@@ -22,21 +22,8 @@ from doe.duty import OPERATION, Duty, Simulated, scene_at
 from doe.pareto import ParetoFront
 from doe.running.runner import ANSWER, AgendaKeeper, Part, Stage, rows_of
 from doe.running.store import Failure
+from doe.workflow import confirmation
 from doe.workflow.adaptive import Adaptive, FrontComparison, advice, check_adaptive, compare_fronts, find_adaptive
-from doe.workflow.confirmation import (
-    EVERYWHERE,
-    Confirmed,
-    Gain,
-    Limit,
-    Verdict,
-    gains,
-    limits_of,
-    point_words,
-    simulate_original,
-    verdict_of,
-    whirl_sentence,
-    worse_notes,
-)
 from doe.workflow.design import check_runs
 from doe.workflow.duty import DutyAnswer, duty_answer
 from doe.workflow.effort import Effort
@@ -232,8 +219,8 @@ class StudyResult:
     robust: Robust | None
     edge: Edge
     tries: int
-    confirmed: Mapping[str, Confirmed]
-    gains: Mapping[str, dict[str, Gain]]
+    confirmed: Mapping[str, confirmation.Confirmed]
+    gains: Mapping[str, dict[str, confirmation.Gain]]
     tolerances: PickTolerances | None
     chains: Mapping[str, ChainResult]
     published_comparisons: dict[str, PublishedComparison]
@@ -244,12 +231,12 @@ class StudyResult:
     duty: DutyAnswer | None = None
 
     @property
-    def baseline(self) -> Confirmed:
+    def baseline(self) -> confirmation.Confirmed:
         """The original design, simulated."""
         return self.confirmed["baseline"]
 
     @property
-    def pick(self) -> Confirmed:
+    def pick(self) -> confirmation.Confirmed:
         """The chosen design, simulated."""
         return self.confirmed["pick"]
 
@@ -263,7 +250,7 @@ class StudyResult:
     def main_point(self) -> str:
         """The point of the duty that ``scenes`` are at."""
         duty = Duty.of(self.study)
-        return EVERYWHERE if duty is None else duty.main
+        return confirmation.EVERYWHERE if duty is None else duty.main
 
     @property
     def cage_classes(self) -> dict[str, str]:
@@ -303,9 +290,9 @@ class StudyResult:
         return made
 
     @property
-    def limits(self) -> list[Limit]:
+    def limits(self) -> list[confirmation.Limit]:
         """The limits at the pick."""
-        return limits_of(self.study, self.pick)
+        return confirmation.limits_of(self.study, self.pick)
 
     @property
     def missed_chains(self) -> dict[str, str]:
@@ -333,16 +320,16 @@ class StudyResult:
         return "missed" if self.obstacles.sentences else "ok"
 
     @property
-    def verdict(self) -> Verdict:
+    def verdict(self) -> confirmation.Verdict:
         """The worst verdict on the limits at the pick; a study that did not keep them has failed."""
-        return verdict_of(self.limits)
+        return confirmation.verdict_of(self.limits)
 
     @property
     def every_note(self) -> Notes:
         """The dangers of the pick first, then those of its runs and of the baseline's, then all other notes."""
-        pick = (*self.obstacles.notes, *worse_notes(self.gains["pick"]))
+        pick = (*self.obstacles.notes, *confirmation.worse_notes(self.gains["pick"]))
         runs = (
-            note.about(f"at the {point_words(name)}")
+            note.about(f"at the {confirmation.point_words(name)}")
             for name in ("pick", "baseline")
             for note in self.confirmed[name].dangers
         )
@@ -354,7 +341,7 @@ class StudyResult:
     @property
     def whirl_sentence(self) -> str:
         """A warning that the whirl with a goal is that of a trembling cage; else empty."""
-        return whirl_sentence(self.study, self.confirmed)
+        return confirmation.whirl_sentence(self.study, self.confirmed)
 
     @property
     def rivals_sentences(self) -> list[str]:
@@ -385,7 +372,7 @@ def run_study(
     if agenda is not None:
         agenda.plan(study_stages(study, adaptive, robust), shorter_by(study, adaptive, robust), STEPS_S)
     with effort.simulations(folder, study.path, agenda) as simulations:
-        original = simulate_original(study, simulations)
+        original = confirmation.simulate_original(study, simulations)
         clock.lap("baseline_s")
         watched = first_look(study, folder, original, simulations.progress(DESIGN), effort.notice)
         runs = run_by_need(study, simulations, watched, effort.notice)
@@ -458,7 +445,9 @@ def _searched(
         clock.lap("adaptive_s")
 
 
-def _tolerances(study: Problem, searched: Adaptive | None, confirmed: Mapping[str, Confirmed]) -> PickTolerances | None:
+def _tolerances(
+    study: Problem, searched: Adaptive | None, confirmed: Mapping[str, confirmation.Confirmed]
+) -> PickTolerances | None:
     pick, settings = confirmed["pick"], study.file.tolerances
     if settings is None:
         return None
@@ -478,8 +467,12 @@ def _compared(study: Problem, runs: Runs, reference: Runs) -> dict[str, Publishe
     return compare_with_published(study, runs.only(list(range(len(reference.coded)))), reference)
 
 
-def _gains(study: Problem, confirmed: Mapping[str, Confirmed]) -> dict[str, dict[str, Gain]]:
-    return {name: gains(study, confirmed["baseline"], point) for name, point in confirmed.items() if name != "baseline"}
+def _gains(study: Problem, confirmed: Mapping[str, confirmation.Confirmed]) -> dict[str, dict[str, confirmation.Gain]]:
+    return {
+        name: confirmation.gains(study, confirmed["baseline"], point)
+        for name, point in confirmed.items()
+        if name != "baseline"
+    }
 
 
 class _Clock:
