@@ -449,13 +449,17 @@ class LargestLoads(Record):
 
 
 class FrictionCheck(Record):
-    """A power loss against SKF's model and the heat of ISO 15312; ``ratio``: over SKF's power, None where that is zero."""
+    """A power loss against SKF's model, and the heat of ISO 15312 at its reference speed.
+
+    ``ratio``: over SKF's power, None where that is zero or starvation removes the rolling friction.
+    """
 
     skf_power_W: float  # noqa: N815
     skf_rolling_moment_N_mm: float  # noqa: N815
     skf_sliding_moment_N_mm: float  # noqa: N815
     iso_15312_heat_W: float  # noqa: N815
     ratio: float | None
+    skf_starvation_factor: float = 1.0
 
 
 class TargetRun(Record):

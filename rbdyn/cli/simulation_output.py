@@ -345,12 +345,13 @@ def _inputs(result: SimulationResult) -> Table:
 
 def _friction_sentence(check: FrictionCheck) -> str:
     """The maker's friction in a line."""
-    share = "no ratio at zero load or speed" if check.ratio is None else f"power loss is {check.ratio:.2f} of SKF's"
+    none = "no ratio, because the oil starves it" if check.skf_power_W else "no ratio at zero load or speed"
+    share = none if check.ratio is None else f"power loss is {check.ratio:.2f} of SKF's"
     moments = (
         f"rolling {shown(check.skf_rolling_moment_N_mm, 3)}, sliding {shown(check.skf_sliding_moment_N_mm, 3)} N mm"
     )
-    powers = f"{shown(check.skf_power_W, 3)} W ({moments})", f"{shown(check.iso_15312_heat_W, 3)} W"
-    return f"friction by SKF's model {powers[0]}, ISO 15312 heat {powers[1]}; {share}"
+    heat = f"heat at the reference speed by ISO 15312 {shown(check.iso_15312_heat_W, 3)} W"
+    return f"friction by SKF's model {shown(check.skf_power_W, 3)} W ({moments}): {share}; {heat}"
 
 
 def _losses(result: SimulationResult) -> list[Block]:

@@ -13,6 +13,8 @@ from rbdyn.base.faults import RPM
 
 # K_rs: 3e-8 for baths and jets, 6e-8 for grease and oil-air; SKF has no drop feed, which is treated as a bath.
 STARVATION, SCARCE_STARVATION = 3e-8, 6e-8
+# A starvation factor far below those of bearings at their reference speed.
+STARVED = 0.1
 SCARCE = ("grease", "oil_air")
 # mu_bl of a rotating bearing: 0.12 in the catalogue of 2018 (from memory); the older ones have 0.15 for all.
 BOUNDARY_FRICTION = 0.12

@@ -281,9 +281,8 @@ RANGE_TOLERANCE = 0.1
 # 64, 72 and 73 in that catalogue.
 LEVELS = {"deep_groove_ball": "0.67 to 0.93", "angular_contact_ball": "1.9 to 2.7"}
 
-# K_Z of SKF's starvation factor by kind, and a factor far below those of bearings at their reference speed.
+# K_Z of SKF's starvation factor by kind.
 GEOMETRIES = {"deep_groove_ball": friction.DEEP_GROOVE_GEOMETRY, "angular_contact_ball": friction.ANGULAR_GEOMETRY}
-STARVED = 0.1
 
 
 def slopes_at(scene: SingleRowScene, temperatures: Array) -> Array:
@@ -450,7 +449,7 @@ def _notes(scene: SingleRowScene, found: Heat, ranges: Ranges) -> Notes:
 def starvation_note(hot: SingleRowScene, subject: str) -> Notes:
     """A note where SKF's starvation factor leaves hardly any rolling friction of a scene at stated temperatures."""
     factor = friction.starvation_factor(GEOMETRIES[hot.bearing.kind], running_of(hot))
-    if factor >= STARVED:
+    if factor >= friction.STARVED:
         return ()
     sentence = (
         f"{subject}: SKF's starvation factor of {factor:.2g} removes the rolling friction of so thick an oil, so the heat is "

@@ -29,7 +29,14 @@ BEARINGS = [
     ("1020", 100, 150, 24, 1.12e-6, 5000, 5700, 515, 302), ("2210", 50, 90, 23, 1.40e-6, 8500, 4400, 346, 162),
 ]  # fmt: skip
 RPM = math.pi / 30.0
-KEYS = {"skf_power_W", "skf_rolling_moment_N_mm", "skf_sliding_moment_N_mm", "iso_15312_heat_W", "ratio"}
+KEYS = {
+    "skf_power_W",
+    "skf_rolling_moment_N_mm",
+    "skf_sliding_moment_N_mm",
+    "iso_15312_heat_W",
+    "ratio",
+    "skf_starvation_factor",
+}
 NAMES = [f"NU {each[0]}" for each in BEARINGS]
 
 
@@ -75,6 +82,24 @@ def test_literature_friction_check_at_the_reference_speed(bearing, make_scene):
     assert check.ratio == pytest.approx(2.5 * skf / check.skf_power_W)
     (note,) = friction_notes(check)
     assert "2.5 times the" in note and "W of SKF's friction model, outside 0.5 to 2" in note
+
+
+def test_unit_cold_oil_has_no_ratio(make_scene):
+    """Unit: exp(-3e-8 nu n (d + D) sqrt(5.1/(2 (D - d)))) below 0.1 leaves no rolling friction to compare with, and a note says so."""
+    point = (
+        'lubricant.oil="ISO VG 220"',
+        "lubricant.temperature_C=0.0",
+        "operation.inner_speed_rpm=600.0",
+        "lubricant.supply=bath",
+    )
+    scene = make_scene('bearing.designation="NU 2212"', *point)
+    check = friction_check(scene, 500.0)
+    nu = 1e6 * scene.oil().viscosity / scene.oil().density
+    factor = math.exp(-3e-8 * nu * 600.0 * (60.0 + 110.0) * math.sqrt(5.1 / (2.0 * 50.0)))
+    assert check is not None and check.ratio is None
+    assert check.skf_starvation_factor == pytest.approx(factor, rel=1e-9) and factor < 0.1
+    (note,) = friction_notes(check)
+    assert note.code == "starved" and f"factor of {factor:.2g}" in note
 
 
 def test_unit_limits_of_the_factors():
@@ -177,7 +202,10 @@ def test_command_line_states_the_makers_friction(tmp_path):
     )
     shown = CliRunner().invoke(app, ["simulate", scene, *named])
     (line,) = [line for line in shown.stdout.splitlines() if line.startswith("friction by SKF's model ")]
-    assert f"power loss is {result['friction_check']['ratio']:.2f} of SKF's" in line and "ISO 15312 heat" in line
+    assert (
+        f"power loss is {result['friction_check']['ratio']:.2f} of SKF's" in line
+        and "heat at the reference speed by ISO 15312" in line
+    )
 
 
 def test_unit_a_study_states_the_makers_friction():

@@ -17,8 +17,16 @@ from rbdyn.contact.hertz_line import ROLLERS, palmgren, pressure_notes
 from rbdyn.contact.rolling_resistance import THINNEST_LAYER, inlet
 from rbdyn.dynamics.forces.bodies import AIR_DENSITY
 from rbdyn.dynamics.parameters.model import film_of, oil_layer, race_contact_law, rolling_contacts
-from rbdyn.life.friction import Running
-from rbdyn.life.rollers import REFERENCE_SPEED, SERIES, iso_15312_heat, minimum_loads, skf_moments, static_capacity
+from rbdyn.life.friction import STARVED, Running, starvation_factor
+from rbdyn.life.rollers import (
+    REFERENCE_SPEED,
+    ROLLER_GEOMETRY,
+    SERIES,
+    iso_15312_heat,
+    minimum_loads,
+    skf_moments,
+    static_capacity,
+)
 from rbdyn.properties.materials import SOFTEST_METAL, equivalent_modulus
 from rbdyn.result import FrictionCheck, RollerContact
 from rbdyn.scene import Scene
@@ -79,7 +87,8 @@ def friction_check(scene: Scene, power_loss: float) -> FrictionCheck | None:
     """SKF's moments [N mm] and power, the heat of ISO 15312, and the simulated ``power_loss`` [W] over SKF's power.
 
     At the speed, load and oil of the scene; the load is the steady one in line with the rotating one. None without a
-    designation, or with a schedule. The ratio is None where SKF's power is zero: no load, or no speed.
+    designation, or with a schedule. The ratio is None where SKF's power is zero (no load, or no speed) or its rolling friction is
+    starved away.
     """
     listed = catalogue_entry(scene.bearing)
     if listed is None or scene.operation.schedule is not None:
@@ -91,13 +100,20 @@ def friction_check(scene: Scene, power_loss: float) -> FrictionCheck | None:
     running = Running(*lengths, inner - outer, oil.viscosity / oil.density, scene.lubricant.supply)
     moments = skf_moments(named.series, running, load)
     power = sum(moments) * abs(inner - outer)
-    ratio = power_loss / power if power > 0.0 else None
-    return FrictionCheck(power, 1e3 * moments.rolling, 1e3 * moments.sliding, iso_15312_heat(sizes), ratio)
+    factor = starvation_factor(ROLLER_GEOMETRY, running)
+    ratio = power_loss / power if power > 0.0 and factor >= STARVED else None
+    return FrictionCheck(power, 1e3 * moments.rolling, 1e3 * moments.sliding, iso_15312_heat(sizes), ratio, factor)
 
 
 def friction_notes(check: FrictionCheck | None) -> Notes:
-    """A note where the simulated power loss is far from SKF's."""
+    """A note where the simulated power loss is far from SKF's, or the oil too thick for SKF's formula."""
     low, high = USUAL_RATIO
+    if check is not None and check.skf_starvation_factor < STARVED:
+        sentence = (
+            f"power loss: it is not compared with SKF's friction model, whose starvation factor of {check.skf_starvation_factor:.2g} "
+            "removes the rolling friction of so thick an oil"
+        )
+        return (Note("starved", sentence),)
     if check is None or check.ratio is None or low <= check.ratio <= high:
         return ()
     sentence = (
