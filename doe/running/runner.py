@@ -211,12 +211,6 @@ def agendas_of(store: Store) -> list[tuple[Agenda, bool]]:
     return sorted(agendas, key=lambda pair: pair[0].begin)
 
 
-# Time [s] at full speed that a first run counts with, so that loading of code does not make a short one look crowded.
-CALM_S = 5.0
-# Largest crowd: runs that take longer wait for something else than a processor.
-MOST_CROWD = 10.0
-
-
 @dataclass
 class AgendaKeeper:
     """Keeper of the agenda of a live process: it notes every change in the store at ``path``, once stages are planned.
@@ -321,23 +315,17 @@ class AgendaKeeper:
                 if outcome.result is not None and not self._estimated:
                     seconds = outcome.seconds - outcome.result.get("cost", {}).get("compile_s", 0.0)
                     running = len(self._store.running()) + 1 if cluster and self._store is not None else threads
-                    spent = shared * max(seconds, 0.0)
-                    crowd = (spent + CALM_S) / (outcome.result.get("cost", {}).get("cpu_s", spent) + CALM_S)
-                    self._estimate(spent / works[point.key] / running, min(max(crowd, 1.0), MOST_CROWD))
+                    self._estimate(shared * max(seconds, 0.0) / works[point.key] / running)
 
             engine(points, replace(ledger, give=end))
 
         return run
 
-    def _estimate(self, pace_s: float, crowd: float) -> None:
-        """State the time of all that is left, where a unit of work takes so long [s]; a short time is not worth a sentence.
-
-        ``crowd``: wall time over processor time of a run; on a busy machine steps that are no runs take longer, too.
-        """
+    def _estimate(self, pace_s: float) -> None:
+        """State the time of all that is left, where a unit of work takes so long [s]; a short time is not worth a sentence."""
         self._estimated = True
-        rest_s = (
-            pace_s * sum(stage.work_left for stage in self.agenda.stages[self.agenda.place :]) + crowd * self._steps_s
-        )
+        work_left = sum(stage.work_left for stage in self.agenda.stages[self.agenda.place :])
+        rest_s = pace_s * work_left + self._steps_s
         if self.notice is not None and rest_s >= NOTABLE_S:
             self.notice(f"{self._why}{estimate(rest_s, self._shorter_by)}")
 
