@@ -368,7 +368,9 @@ def _row_tables(title: str, row: RowReport) -> list[Block]:
 
 def _row_sentences(row: RowReport) -> list[str]:
     tilts = ", ".join(f"tilt {axis} {row.tilt_mrad[axis]:.4g} mrad" for axis in "xy")
-    sentences = [f"ring (x along the radial load; z along the axis, 0 where all balls of the drawing just touch): {_place(row.displacement_mm)}, {tilts}"]
+    sentences = [
+        f"ring (x along the radial load; z along the axis, 0 where all balls of the drawing just touch): {_place(row.displacement_mm)}, {tilts}"
+    ]
     for race, contact in row.contacts.items():
         film = contact.film
         oil = "" if film is None else f", film {film.central_film_um:.3g} µm, lambda {film.lambda_ratio:.2g}"

@@ -3,15 +3,21 @@
 from __future__ import annotations
 
 import json
+import tomllib
 
 import extremes
 import pandas as pd
 import pytest
 from extremes import CLOSED, OPEN, REFUSED, STOPPED, TIGHTENED, Ending, battery, cases, ending
+from typer.testing import CliRunner
 
 from rbdyn.accuracy import write
 from rbdyn.accuracy.variants import with_options
-from rbdyn.base.faults import InputError
+from rbdyn.base.faults import InputError, RunError
+from rbdyn.cli.app import app
+from rbdyn.dynamics.ensemble import Stop
+from rbdyn.dynamics.parameters.model import roller_bearing
+from rbdyn.dynamics.run import Run
 from rbdyn.scene import Scene
 
 EXAMPLE = "examples/cylindrical_roller.toml"
@@ -126,3 +132,17 @@ def test_invariant_battery():
     assert rows["10 rpm"].method == rows["guide clearance of 1 um"].method == "rosenbrock"
     for row in rows.values():
         assert row.power_gap < 0.01, row.case
+
+
+@pytest.mark.parametrize(("temperature_C", "budget", "is_film"), [(0.0, 20_000, True), (40.0, 1000, False)])
+def test_a_run_that_thick_oil_on_the_land_slows_says_so(temperature_C, budget, is_film):
+    """Stiff: eight pascal seconds on the guide land limit the steps, and a tenth of them does not."""
+    command = ["new", "NU2212", "--speed", "300", "--load", "8000", "--oil", "ISO VG 220"]
+    scene = Scene.from_dict(tomllib.loads(CliRunner().invoke(app, command).stdout))
+    sets = {"lubricant.temperature_C": temperature_C, "numerics.step_budget_per_turn": budget, "numerics.turns": 2.0}
+    scene = scene.changed(sets | {"numerics.discard_turns": 0.0})
+    run = Run(scene, roller_bearing(scene), 0, scene.numerics.rtol, Stop())
+    with pytest.raises(RunError) as gave_up:
+        run.to(2.0)
+    film, law = "because the thick oil on the guide land damps the cage in ", "or soften the stiffest law"
+    assert (film in str(gave_up.value)) == is_film and (law in str(gave_up.value)) != is_film
