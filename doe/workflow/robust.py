@@ -23,18 +23,7 @@ from doe.unknown import inputs as unknown
 from doe.unknown.decision import DecisiveInputs, InputWorth, decisive_inputs, gain_chances, in_doubt, odds, shrunk
 from doe.unknown.inputs import nested
 from doe.unknown.propagation import Emulated, Runs, Share, emulated
-from doe.workflow.input_sets import (
-    ROUND_SEEDS,
-    Case,
-    Sets,
-    case_of,
-    declared,
-    impossible,
-    run,
-    run_notes,
-    strongest_inputs,
-    work_of_set,
-)
+from doe.workflow import input_sets
 from doe.workflow.judgement import ConfirmedGain, Decider, Decision, GainPoint, Pair, Robust, RobustFront, worded
 from doe.workflow.problem import Problem
 from rbdyn.base.arrays import Array, Whole, one_thread
@@ -112,7 +101,7 @@ def relative_gains(goals: Goals, designs: NoisyValues) -> NoisyValues:
 
 
 def simulate_designs(
-    case: Case,
+    case: input_sets.Case,
     quantiles: Array,
     designs: Mapping[str, Sequence[str]],
     simulations: Simulations,
@@ -121,7 +110,9 @@ def simulate_designs(
 ) -> tuple[Pairs, tuple[Failure, ...]]:
     """Simulate designs, each as overrides of the scene, at input sets; sets at which any design failed are left out."""
     shared, title = (case, case.every, quantiles, simulations, seeds), f"input sets of the {{}}, from seed {seeds},"
-    sets_of_design = [run(*shared, [*design, *overrides], title.format(name)) for name, design in designs.items()]
+    sets_of_design = [
+        input_sets.run(*shared, [*design, *overrides], title.format(name)) for name, design in designs.items()
+    ]
     places = reduce(np.intersect1d, (sets.places for sets in sets_of_design))
     outputs = NoisyValues.stacked([sets.outputs.at(np.isin(sets.places, places)) for sets in sets_of_design])
     failures = tuple(failure for sets in sets_of_design for failure in sets.failures)
@@ -137,7 +128,7 @@ POPULATION, GENERATIONS = 60, 40
 
 
 def find_robust_front(
-    study: Problem, case: Case, pairs: Pairs, pick: Array, simulations: Simulations
+    study: Problem, case: input_sets.Case, pairs: Pairs, pick: Array, simulations: Simulations
 ) -> tuple[RobustFront, int, tuple[Failure, ...]]:
     """The front, its number of runs, and its failures; ``pairs``: the baseline and the pick at the study's input sets.
 
@@ -195,8 +186,8 @@ def fresh_rows(points: int) -> Whole:
 
 
 def _runs(
-    study: Problem, case: Case, pairs: Pairs, box: tuple[Array, Array], simulations: Simulations
-) -> tuple[Sets, Array, Whole]:
+    study: Problem, case: input_sets.Case, pairs: Pairs, box: tuple[Array, Array], simulations: Simulations
+) -> tuple[input_sets.Sets, Array, Whole]:
     """Runs of designs spread over the ``box`` at the second half of the study's input sets, as many as there are sets.
 
     Also the places (n, k) of these designs, from 0 to 1, and the rows (n,) of the pairs at the same input sets.
@@ -207,16 +198,16 @@ def _runs(
     rows = np.resize(half, points)
     overrides = [study.assignments(point) for point in low + (high - low) * even]
     title = "runs of the robust front"
-    sets = run(case, case.every, pairs.quantiles[rows], simulations, JOINT_SEEDS, (), title, overrides)
+    sets = input_sets.run(case, case.every, pairs.quantiles[rows], simulations, JOINT_SEEDS, (), title, overrides)
     return sets, even[sets.places], rows[sets.places]
 
 
 def _emulators(
-    case: Case, goals: Goals, sets: Sets, places: Array, base: Pairs, box: tuple[Array, Array]
+    case: input_sets.Case, goals: Goals, sets: input_sets.Sets, places: Array, base: Pairs, box: tuple[Array, Array]
 ) -> "_GainEmulators":
     """Emulators of the gains over the baseline ``base`` at the same input sets, and of limited responses."""
     factors = places.shape[1]
-    required = [*range(factors), *(factors + place for place in declared(case))]
+    required = [*range(factors), *(factors + place for place in input_sets.declared(case))]
     cover = factors + case.uncertain.inputs, required
     positions = np.hstack([places, sets.quantiles])
     outputs = NoisyValues.stacked([base.outputs.at(0), sets.outputs])
@@ -321,7 +312,7 @@ def judge(study: Problem, pick: Array, simulations: Simulations) -> Robust:
     names = [study.responses[index] for index in goals.objectives]
     gains, variances = pairs.gains(goals)
     # For the emulators, the effects of the other inputs are scatter.
-    places, outside_shares = strongest_inputs(case, pairs.quantiles, gains)
+    places, outside_shares = input_sets.strongest_inputs(case, pairs.quantiles, gains)
     inputs, columns = [case.every[place] for place in places], [*places, -1]
     fresh_sets = joint.sets(FRESH, seed + 1)[:, columns]
     knowable = [place for place, unknown_input in enumerate(inputs) if unknown_input.law.kind == "unknown"]
@@ -347,12 +338,16 @@ def judge(study: Problem, pick: Array, simulations: Simulations) -> Robust:
         failures=failures,
         odds=limit_odds(study, pairs, seed),
     )
-    notes = (*case.notes, *run_notes(case, study.scene.set, "scene.set: ", "other runs of the study"))
+    notes = (*case.notes, *input_sets.run_notes(case, study.scene.set, "scene.set: ", "other runs of the study"))
     return worded(robust, decision, notes)
 
 
 def _pairs_in_rounds(
-    study: Problem, case: Case, quantiles: Array, designs: Mapping[str, Sequence[str]], simulations: Simulations
+    study: Problem,
+    case: input_sets.Case,
+    quantiles: Array,
+    designs: Mapping[str, Sequence[str]],
+    simulations: Simulations,
 ) -> tuple[Pairs, int, tuple[Failure, ...]]:
     """Both designs at the input sets, with further replicates where a gain is in doubt; runs spent; and failures."""
     goals, replicates = study.goals, case.replicates
@@ -366,7 +361,7 @@ def _pairs_in_rounds(
         if rows.size == 0:
             break
         overrides = [f"numerics.replicates={replicates * multiple}"]
-        seeds = (round_number + 1) * ROUND_SEEDS
+        seeds = (round_number + 1) * input_sets.ROUND_SEEDS
         quantiles = pairs.quantiles[rows]
         new_pairs, new_failures = simulate_designs(case, quantiles, designs, simulations, seeds, overrides)
         rows, spent, failures = rows[new_pairs.places], spent + 2 * multiple * len(rows), (*failures, *new_failures)
@@ -389,7 +384,7 @@ def limit_odds(study: Problem, pairs: Pairs, seed: int) -> dict[str, Share]:
     }
 
 
-def case_of_study(study: Problem) -> Case:
+def case_of_study(study: Problem) -> input_sets.Case:
     """The study's scene with its unknown inputs; factors are none of them."""
     path = study.path_of(study.scene.file)
     data = deepcopy(study.scene_tables)
@@ -399,10 +394,10 @@ def case_of_study(study: Problem) -> Case:
     duty = study.duty_with_groups
     fixed = dict.fromkeys([] if duty is None else duty.keys, "a key of the duty")
     fixed |= dict.fromkeys(keys, "a factor of the study")
-    case = case_of(str(path), data, study.responses, study.file.uncertain, fixed, study.path)
+    case = input_sets.case_of(str(path), data, study.responses, study.file.uncertain, fixed, study.path)
     if duty is not None:
         case = replace(case, outputs=tuple(duty.columns), duty=duty)
-        refuse(impossible(case))
+        refuse(input_sets.impossible(case))
     classes, sets, declared_runs = study.file.limits.classes, case.scene_of_sets, case.uncertain
     if classes and sets.cage_turns < BLOCK_TURNS:
         others = [text for text in declared_runs.set if key_path(text) != ("numerics", "turns")]
@@ -417,7 +412,9 @@ def case_of_study(study: Problem) -> Case:
     return replace(case, classes=classes)
 
 
-def _decision_by_keys(case: Case, inputs: Sequence[Input], analysis: DecisiveInputs) -> tuple[Pair | None, Decision]:
+def _decision_by_keys(
+    case: input_sets.Case, inputs: Sequence[Input], analysis: DecisiveInputs
+) -> tuple[Pair | None, Decision]:
     """The best pair and the decision, by keys and values of the inputs."""
 
     def decider(deciding: InputWorth) -> Decider:
@@ -441,7 +438,7 @@ def _decision_by_keys(case: Case, inputs: Sequence[Input], analysis: DecisiveInp
     )
 
 
-def _value(case: Case, unknown_input: Input, quantile: float | None) -> Any:
+def _value(case: input_sets.Case, unknown_input: Input, quantile: float | None) -> Any:
     """Value of an input at a quantile, in the unit of its key; None without a quantile."""
     if quantile is None:
         return None
@@ -459,4 +456,4 @@ def robust_stage(study: Problem) -> Stage:
         runs += settings.points + POINTS * CONFIRMED + 2 * new_sets
     titles = "input sets", "runs of the robust front"
     points = points_in(case.duty)
-    return Stage.of("robust", points * runs, work_of_set(case), *titles, fewest=points * fewest)
+    return Stage.of("robust", points * runs, input_sets.work_of_set(case), *titles, fewest=points * fewest)
