@@ -40,6 +40,11 @@ def test_inputs_life_clearances_and_the_next_command_are_said(result, make_scene
     hours = static_life(scene).figures(*scene.operation.speeds).L10_h
     full = text(blocks(result, Path("run one")), Detail.ALL)
     assert f"life L10r: {shown(hours, 2)} h" in full and "next: rbdyn show run one --animate" in full
+    profiled = make_scene(*QUICK, "bearing.roller_profile=logarithmic", "model.slices=31")
+    with_edges = static_life(profiled).figures(*scene.operation.speeds).L10_h
+    assert (
+        with_edges < 0.7 * hours and f"; {shown(with_edges, 2)} h with the standard's profile and edge stress" in full
+    )
     assert f"drawn +{1e3 * scene.bearing.radial_clearance_mm:.1f} µm" in full and "operating +" in full
     inputs = dict(table(blocks(result), "Inputs").rows)
     assert inputs["bearing: rollers"] == str(scene.bearing.rollers) and "bearing: pitch diameter [mm]" in inputs
