@@ -51,7 +51,7 @@ ACCURACY_FILES = tuple(
 )
 SHOW_FILES = (
     "orbit.json", "history.csv", "cage_orbit.png", "forces.png", "whirl.png", "poincare.png", "spectra.png", "roller_loads.png",
-    "sliding.png", "power.png", "bearing.html",
+    "sliding.png", "power.png", "bearing.html", "bearing.mp4", "bearing.gif",
 )  # fmt: skip
 
 app = command.Program()
@@ -339,7 +339,7 @@ def show(
     force: command.Force = False,
     turns: Annotated[float | None, command.valued("N", "Counted shaft turns to show.", "all, at most 20")] = None,
     replicate: Annotated[int, typer.Option(metavar="N", help="Number of the replicate, from 1.")] = 1,
-    animate: Annotated[bool, command.flag("--animate", help="Add a page that plays the motion.")] = False,
+    animate: Annotated[bool, command.flag("--animate", help="Add a film and a page that plays the motion.")] = False,
     as_json: command.Json = False,
     quiet: command.Quiet = False,
     verbose: Annotated[bool, command.verbose_flag("Add peaks of the spectra.")] = False,

@@ -1,4 +1,4 @@
-"""What ``rbdyn show`` prints and writes: pictures and motion of a saved result.
+"""What ``rbdyn show`` prints and writes: pictures and films of a saved result.
 
 A saved result has no motion, but scene and seed, and equal scenes give equal bits. So the history is computed again; pictures,
 a table of samples and the figures of the motion are written.
@@ -100,8 +100,9 @@ def write(
     if animate:
         progress(len(tasks) + 1, steps)
         from rbdyn.plots.drawing import player_html
+        from rbdyn.plots.roller import moving_bearing
 
-        files.append("bearing.html")
+        files += [moving_bearing(motion, folder / "bearing").name, "bearing.html"]
         (folder / "bearing.html").write_text(player_html(motion, _cage(request)), encoding="utf-8")
     record = {**_record(request, motion), "notes": plain(request.notes), "versions": versions()}
     record["files"] = ["orbit.json", *files]

@@ -1,6 +1,6 @@
 """Pictures. matplotlib is loaded in this package and nowhere else in ``rbdyn``.
 
-- ``roller``: pictures of a history and of a slip map, power by loss
+- ``roller``: pictures of a history and of a slip map, power by loss, the moving bearing as GIF or MP4
 - ``start``: temperatures and clearances of a machine that warms
 - ``ball``: one equilibrium of a ball bearing, and many over one or two keys of the scene
 - ``drawing``: the bearing at one moment with magnified clearances, and the page of HTML that plays it

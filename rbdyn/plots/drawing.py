@@ -120,8 +120,8 @@ def tidy(value: float) -> float:
     return max(digit * decade for digit in TIDY if digit * decade <= value * (1.0 + 1e-9))
 
 
-def drawing(history: "History", turns: float, frames_per_turn: int, most_frames: int) -> Drawing:
-    """At most so many frames at equal intervals, from ``turns`` shaft turns about the largest pocket force."""
+def drawing(history: "History", turns: float, frames_per_turn: int, most_frames: int = 2000) -> Drawing:
+    """Frames at equal intervals from ``turns`` shaft turns about the largest pocket force."""
     from rbdyn.dynamics.motion import largest
 
     scene, z = history.scene, history.scene.bearing.rollers

@@ -40,9 +40,9 @@ def plain(axis: Axes) -> None:
     axis.spines[["top", "right"]].set_visible(False)
 
 
-def blank(size: tuple[float, float]) -> Figure:
+def blank(size: tuple[float, float], dpi: float | None = None) -> Figure:
     """A figure of a size [in]. Without pyplot, whose import takes a fifth of a second for windows that no command has."""
-    figure = Figure(size)
+    figure = Figure(size, dpi)
     FigureCanvasAgg(figure)
     return figure
 

@@ -1,4 +1,4 @@
-"""The command ``rbdyn show`` as a user meets it, and the pages and pictures it writes."""
+"""The command ``rbdyn show`` as a user meets it, and the moving pictures it writes."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from conftest import EXAMPLE, SHORT
 
 from rbdyn.base.faults import InputError
 from rbdyn.cli.show import request_of
+from rbdyn.plots import roller
 
 QUICK = [part for assignment in SHORT for part in ("--set", assignment)]
 PICTURES = {
@@ -29,9 +30,11 @@ def saved(command, tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def shown(command, saved, tmp_path_factory):
-    """All that ``rbdyn show`` can write, and its JSON."""
+    """All that ``rbdyn show`` can write, and its JSON; the film in a quarter of its frames."""
     folder = tmp_path_factory.mktemp("shown")
-    done = command("show", saved, "--out", folder, "--animate", "--json")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(roller, "FRAMES_PER_TURN", 11)
+        done = command("show", saved, "--out", folder, "--animate", "--json")
     assert (done.returncode, done.stderr) == (0, "")
     return folder, json.loads(done.stdout)
 
@@ -50,7 +53,7 @@ def test_show_writes_pictures_samples_and_figures(saved, shown):
     written = {path.name for path in folder.iterdir()}
     assert written == {*record["files"], "made_by.json"}
     written.remove("made_by.json")
-    assert written == PICTURES | {"orbit.json", "history.csv", "bearing.html"}
+    assert written - {"bearing.gif", "bearing.mp4"} == PICTURES | {"orbit.json", "history.csv", "bearing.html"}
     for name in PICTURES:
         assert (folder / name).read_bytes().startswith(b"\x89PNG")
     assert json.loads((folder / "orbit.json").read_text()) == record
@@ -78,6 +81,21 @@ def test_show_states_the_class_of_the_result(saved, shown, page):
     verdict = json.loads((saved / "result.json").read_text())["verdict"]
     assert shown[1]["verdict"] == verdict
     assert page[1]["title"].endswith(f"; cage: {verdict['class']}")
+
+
+def test_show_film_moves(shown):
+    """Show: the moving picture has more than one frame."""
+    from PIL import Image
+
+    film = shown[0] / next(name for name in shown[1]["files"] if name.startswith("bearing.") and name[-1] != "l")
+    if film.suffix == ".gif":
+        with Image.open(film) as frames:
+            assert frames.n_frames > 20
+            first = np.asarray(frames.convert("RGB"))
+            frames.seek(10)
+            assert (np.asarray(frames.convert("RGB")) != first).any()
+    else:
+        assert film.read_bytes()[4:8] == b"ftyp"
 
 
 def test_show_player_stands_alone(page):
