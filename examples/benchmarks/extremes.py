@@ -1,165 +1,45 @@
-"""How extreme variants of a scene end, and every reason.
+"""How the extreme variants of ``rbdyn accuracy SCENE.toml stability`` end, over several scenes at once.
 
-``python examples/benchmarks/extremes.py [SCENE.toml]``: a variant is a few assignments to the scene (``extremes.toml``). It ends with a
-finite answer whose power balance closes, or with the reason why not. Each runs one replicate over few turns. Where the balance
-stays open, it runs once more at a tenth of the tolerance, to see whether that fixes it.
+``python examples/benchmarks/extremes.py [SCENE.toml]``: the variants of this scene and of the shipped ones with every option and
+of an NU 215; a line a scene with how many end how, and every case that neither closes nor tells why.
 """
 
-import math
 import sys
-from collections.abc import Mapping, Sequence
+from collections import Counter
+from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
-from string import Template
-from typing import Any
 
-from studies import main
+from studies import EXAMPLES, main
 
-from rbdyn.accuracy.report import Progress, Report, Reporter, records, reported
-from rbdyn.accuracy.variants import with_options
-from rbdyn.base.blocks import Sheet, columns_of
-from rbdyn.base.faults import InputError, RunError, read_toml
-from rbdyn.base.records import Record, finite, shown
-from rbdyn.dynamics.ensemble import Stop
-from rbdyn.dynamics.figures import IMPACT_FORCE, POWER_LOSS, WHIRL_DEVIATION_RATIO
-from rbdyn.dynamics.parameters.model import roller_bearing
-from rbdyn.dynamics.recording import run_replicate
-from rbdyn.dynamics.run import held_by_stability, largest_eigenvalue, prepare
+from rbdyn.accuracy.report import Report, Reporter, records, reported
+from rbdyn.accuracy.variants import CLOSED, OPEN, REFUSED, STOPPED, TIGHTENED, Ending, battery
+from rbdyn.base.blocks import Table
 from rbdyn.scene import Scene
 
-LARGEST_GAP = 0.01
-TURNS, DISCARDED = 5, 2
-# How a case may end. All but "open" say what to do; "refused" and "stopped" do so in their reason.
-CLOSED, TIGHTENED, OPEN, STOPPED, REFUSED = "closed", "closed, tightened", "open", "stopped", "refused"
+OTHERS = ("all_options.toml", "published/nu215.toml")
+STATUSES = (CLOSED, TIGHTENED, OPEN, STOPPED, REFUSED)
 
 
-class Ending(Record):
-    """How a case ended; figures are None where it did not run.
-
-    ``held``: share of the explicit steps that stability limited, not accuracy; ``stiffness_ratio``: |eigenvalue| of the motion
-    that limited them times the duration of a shaft turn, zero where none was limited.
-    """
-
-    case: str = shown("case")
-    assignments: tuple[str, ...]
-    status: str = shown("status")
-    reason: str = ""
-    method: str | None = shown("method", default=None)
-    rtol: float | None = None
-    steps_per_turn: float | None = shown("steps a turn", ".0f", default=None)
-    turn_ms: float | None = shown("ms a turn", ".3g", default=None)
-    power_gap: float | None = shown("power gap", ".1e", default=None)
-    held: float | None = None
-    stiffness_ratio: float | None = shown("stiffness ratio", ".1e", default=None)
-    impact_force_N: float | None = shown("impact [N]", ".4g", default=None)  # noqa: N815
-    whirl_deviation_ratio: float | None = shown("whirl ratio", ".3g", default=None)
-    power_loss_W: float | None = shown("loss [W]", ".4g", default=None)  # noqa: N815
-
-    @property
-    def unexplained(self) -> bool:
-        """Whether the case failed without a diagnosis."""
-        return self.status == OPEN
-
-
-def cases(scene: Scene) -> dict[str, tuple[str, ...]]:
-    """Extreme variants of a scene, by name (``extremes.toml``)."""
-    operation, bearing = scene.operation, scene.bearing
-    rpm = operation.inner_speed_rpm or operation.outer_speed_rpm
-    figures = {
-        "rpm": rpm,
-        "back": -rpm,
-        "run_s": (TURNS + DISCARDED) * scene.turn_s,
-        "heavy": 20.0 * operation.radial_load_N,
-        "pitch": bearing.pitch_diameter_mm * max(100.0 / bearing.rollers, 1.0),
-    }
-    listed = read_toml(Path(__file__).with_name("extremes.toml"))
-    return {name: tuple(Template(text).substitute(figures) for text in texts) for name, texts in listed.items()}
-
-
-def battery(
-    scene: Scene, selection: Mapping[str, Sequence[str]] | None = None, progress: Reporter = None
-) -> list[Ending]:
-    """A row a case, of all cases unless there is a ``selection``. Raises KeyboardInterrupt."""
-    listed = cases(scene) if selection is None else selection
-    counted = Progress(progress, len(listed))
-    return [ending(scene, name, assignments) for name, assignments in counted.over(listed.items())]
-
-
-def ending(scene: Scene, case: str, assignments: Sequence[str]) -> Ending:
-    """Run one case."""
-    short = (f"numerics.turns={TURNS}", f"numerics.discard_turns={DISCARDED}", "numerics.impact_window_turns=1e9")
-    assignments = tuple(assignments)
-    try:
-        varied = with_options(scene, (*short, *assignments))
-        bearing = roller_bearing(varied)
-    except InputError as error:
-        return Ending(case, assignments, REFUSED, "; ".join(error.faults))
-    rtol, tightened = varied.numerics.rtol, False
-    try:
-        prepare(varied, bearing)
-        run = run_replicate(varied, bearing, 0, rtol, Stop())
-        if not run.power_gap <= LARGEST_GAP and rtol >= 1e-12:
-            rtol, tightened = 0.1 * rtol, True
-            run = run_replicate(varied, bearing, 0, rtol, Stop())
-    except RunError as error:
-        return Ending(case, assignments, STOPPED, str(error))
-    turns = varied.numerics.turns + varied.numerics.warm_up_turns
-    figures = {
-        "power_gap": run.power_gap,
-        "impact_force_N": IMPACT_FORCE.value(run),
-        "whirl_deviation_ratio": WHIRL_DEVIATION_RATIO.value(run),
-        "power_loss_W": POWER_LOSS.value(run),
-    }
-    status, reason = _judge(figures, rtol, tightened)
-    return Ending(
-        case,
-        assignments,
-        status,
-        reason,
-        method=run.method,
-        rtol=rtol,
-        steps_per_turn=(run.accepted_steps + run.rejected_steps) / turns,
-        turn_ms=run.cpu_s / turns * 1e3,
-        held=held_by_stability(run.stiffness),
-        stiffness_ratio=largest_eigenvalue(run.stiffness) * varied.turn_s,
-        **{name: finite(value) for name, value in figures.items()},
-    )
-
-
-def _judge(figures: Mapping[str, float], rtol: float, tightened: bool) -> tuple[str, str]:
-    if not all(math.isfinite(figure) for figure in figures.values()):
-        return OPEN, "a result is not finite"
-    if (gap := figures["power_gap"]) > LARGEST_GAP:
-        return OPEN, f"power balance closes only to {100.0 * gap:.2g} %, even at rtol {rtol:g}"
-    if tightened:
-        return TIGHTENED, f"the power balance closes only with numerics.rtol = {rtol:g}; set it"
-    return CLOSED, ""
-
-
-def study(scene: Scene, progress: Reporter = None) -> Report:
-    """Endings of all extreme variants of a scene. Raises KeyboardInterrupt."""
-    return report(battery(scene, progress=progress))
-
-
-def report(rows: Sequence[Ending]) -> Report:
-    """Table of the endings, and every reason."""
-    unexplained = sum(row.unexplained for row in rows)
-    written = records(rows)
-    failures = f"{unexplained} of {len(rows)} cases failed without a diagnosis"
-    status: dict[str, Any] = {"status": failures} if unexplained else {}
-    title = f"extreme scenes; closed: power balance within {100.0 * LARGEST_GAP:g} %"
-    sentences = [f"{row.case}: {row.reason}" for row in rows if row.reason]
+def study(scene: Scene, progress: Reporter = None, others: Sequence[str] = OTHERS) -> Report:
+    """Endings of the variants of a scene and of ``others``, files of examples. Raises InputError, KeyboardInterrupt."""
+    scenes = {"scene": scene, **{name: Scene.load(EXAMPLES / name) for name in others}}
+    endings = {name: battery(each, progress=progress) for name, each in scenes.items()}
+    table = Table("extreme variants by how they end", ("of", *STATUSES, "largest power gap", "slowest [ms a turn]"),
+                  [_row(name, rows) for name, rows in endings.items()])  # fmt: skip
+    unexplained = [
+        f"{name}: {row.case}: {row.reason}" for name, rows in endings.items() for row in rows if row.unexplained
+    ]
+    written = [{"of": name, **row} for name, rows in endings.items() for row in records(rows)]
     sheet = [row | {"assignments": " ".join(row["assignments"])} for row in written]
-    outcome = reported(
-        "extremes",
-        (Sheet(title, columns_of(Ending), rows).block,),
-        sentences,
-        sheet,
-        **status,
-        largest_gap=LARGEST_GAP,
-        cases=written,
-    )
-    return replace(outcome, failed=unexplained > 0)
+    report = reported("extremes", (table,), unexplained, sheet, cases=written)
+    return replace(report, failed=bool(unexplained))
+
+
+def _row(name: str, rows: Sequence[Ending]) -> list[str]:
+    counts = Counter(row.status for row in rows)
+    gap = max((row.power_gap for row in rows if row.power_gap is not None), default=0.0)
+    slowest = max((row.turn_ms for row in rows if row.turn_ms is not None), default=0.0)
+    return [name, *(str(counts[status]) for status in STATUSES), f"{100.0 * gap:.2g} %", f"{slowest:.3g}"]
 
 
 if __name__ == "__main__":

@@ -6,7 +6,7 @@
 - ``methods``: ours and other integrators at equal error, all on one compiled right-hand side (``fixed_step``); for a ball
   bearing its solver (``ball_solvers``)
 - ``coverage``: how often stated intervals contain the truth
-- ``options`` (``variants``): cost of each option
+- ``options`` and ``stability`` (``variants``): cost of each option, and how extreme variants of a scene end
 
 Each is a function ``study(scene, progress) -> Report`` (``report``: tables, sentences, files). A reference is a much tighter
 run, or one that two methods agree on. Error and time come from separate runs, and a first call never counts. Failures stay
@@ -41,6 +41,7 @@ STUDIES = {
     "methods": "rbdyn.accuracy.methods:study",
     "coverage": "rbdyn.accuracy.coverage:study",
     "options": "rbdyn.accuracy.variants:study_options",
+    "stability": "rbdyn.accuracy.variants:study_stability",
 }
 # Of ball bearings, solved to rounding, without tolerance, interval or right-hand side.
 BALL_STUDIES = {"methods": "rbdyn.accuracy.ball_solvers:study"}

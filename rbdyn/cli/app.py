@@ -46,7 +46,7 @@ MAP_FILES, MAP_POINTS = ("map.json", "map.csv", "duty.csv", "map.png"), "map_poi
 STIFFNESS_FILES = ("stiffness.json", "stiffness.csv", "stiffness.png")
 ACCURACY_FILES = tuple(
     f"{name}.{kind}"
-    for name in ("accuracy", "trajectory", "methods", "coverage", "options", "solvers")
+    for name in ("accuracy", "trajectory", "methods", "coverage", "options", "stability", "solvers")
     for kind in ("json", "csv", "png")
 )
 SHOW_FILES = (
@@ -147,8 +147,8 @@ def accuracy(
     study: Annotated[
         str | None,
         typer.Argument(
-            metavar="[tolerances|methods|coverage|options]",
-            help="Error by tolerance, other integrators or ball solver, coverage of intervals, or cost of options.",
+            metavar="[tolerances|methods|coverage|options|stability]",
+            help="Error by tolerance, other integrators or ball solver, coverage of intervals, cost of options, or extreme variants.",
             show_default="tolerances; methods of a ball bearing",
         ),
     ] = None,

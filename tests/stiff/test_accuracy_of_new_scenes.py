@@ -11,7 +11,6 @@ import time
 import tomllib
 from functools import partial
 
-import extremes
 import numpy as np
 import pytest
 from typer.testing import CliRunner
@@ -28,7 +27,6 @@ SHORT = (
 )  # fmt: skip
 # The tested scenes, one with grease and one with heat, share out the options and the extremes, each of which is compiled.
 SEEDS = (2, 7)
-STUDIES = (*accuracy.STUDIES, "extremes")
 CATALOGUE = ("NU210", "NU2208", "NU308", "NU1014", "NU2311", "N215")
 
 
@@ -67,18 +65,18 @@ def short_study(study: str, scene: Scene) -> accuracy.Report:
         patch.setattr(methods, "starts_after_transient", partial(methods.starts_after_transient, starts=1))
         patch.setattr(methods, "SPANS", (methods.DEFAULT_TURNS,))
         patch.setattr(methods, "REPEATS", 1)
-        return extremes.study(scene) if study == "extremes" else accuracy.study(study, scene)
+        return accuracy.study(study, scene)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", SEEDS)
-@pytest.mark.parametrize("study", STUDIES)
+@pytest.mark.parametrize("study", accuracy.STUDIES)
 def test_stiff_every_study_ends(study, seed, monkeypatch):
     """Stiff: each study of a scene with grease, and of one with heat, ends without a failure and says something of its scene."""
-    share, cases = SEEDS.index(seed), extremes.cases
+    share, cases = SEEDS.index(seed), variants.cases
     for option in sorted(variants.OPTIONS)[1 - share :: 2]:
         monkeypatch.delitem(variants.OPTIONS, option)
-    monkeypatch.setattr(extremes, "cases", lambda scene: dict([*cases(scene).items()][share::2]))
+    monkeypatch.setattr(variants, "cases", lambda scene: dict([*cases(scene).items()][share::2]))
     report = short_study(study, new_scene(seed))
     assert report.record["status"] == "ok" and not report.failed
     assert report.tables[0].rows
@@ -86,7 +84,7 @@ def test_stiff_every_study_ends(study, seed, monkeypatch):
 
 if __name__ == "__main__":
     for number in map(int, sys.argv[1:] or range(10)):
-        for name in STUDIES:
+        for name in accuracy.STUDIES:
             before = time.process_time()
             found = short_study(name, new_scene(number))
             print(

@@ -3,21 +3,24 @@
 from __future__ import annotations
 
 import json
-import tomllib
 
-import extremes
 import pandas as pd
 import pytest
-from extremes import CLOSED, OPEN, REFUSED, STOPPED, TIGHTENED, Ending, battery, cases, ending
-from typer.testing import CliRunner
 
-from rbdyn.accuracy import write
-from rbdyn.accuracy.variants import with_options
-from rbdyn.base.faults import InputError, RunError
-from rbdyn.cli.app import app
-from rbdyn.dynamics.ensemble import Stop
-from rbdyn.dynamics.parameters.model import roller_bearing
-from rbdyn.dynamics.run import Run
+from rbdyn.accuracy import variants, write
+from rbdyn.accuracy.variants import (
+    CLOSED,
+    OPEN,
+    REFUSED,
+    STOPPED,
+    TIGHTENED,
+    Ending,
+    battery,
+    cases,
+    ending,
+    with_options,
+)
+from rbdyn.base.faults import InputError
 from rbdyn.scene import Scene
 
 EXAMPLE = "examples/cylindrical_roller.toml"
@@ -73,21 +76,21 @@ def test_unit_ways_to_end(rows):
 
 def test_unit_open_balance_is_unexplained(outer, monkeypatch):
     """Unit: a balance that stays open though the tolerance was tightened makes the battery fail."""
-    monkeypatch.setattr(extremes, "LARGEST_GAP", 1e-12)
+    monkeypatch.setattr(variants, "LARGEST_GAP", 1e-12)
     row = ending(outer, "as given", ())
     assert row.status == OPEN and row.unexplained and "even at rtol 0.001" in row.reason
-    assert extremes.report([row]).record["status"] == "1 of 1 cases failed without a diagnosis"
+    assert variants.report([row]).record["status"] == "1 of 1 cases failed without a diagnosis"
 
 
 def test_unit_record_and_files(rows, tmp_path):
     """Unit: JSON without NaN, a line a case in the table, as many cells as headings."""
     listed = list(rows.values())
-    report = extremes.report(listed)
-    assert write(report, tmp_path) == ["extremes.json", "extremes.csv"]
-    saved = json.loads((tmp_path / "extremes.json").read_text())
-    assert saved["format"] == "rbdyn.extremes/1" and saved["status"] == "ok"
+    report = variants.report(listed)
+    assert write(report, tmp_path) == ["stability.json", "stability.csv"]
+    saved = json.loads((tmp_path / "stability.json").read_text())
+    assert saved["format"] == "rbdyn.stability/1" and saved["status"] == "ok"
     assert [case["case"] for case in saved["cases"]] == list(rows)
-    assert len(pd.read_csv(tmp_path / "extremes.csv")) == len(rows)
+    assert len(pd.read_csv(tmp_path / "stability.csv")) == len(rows)
     (table,) = report.tables
     assert [line[0] for line in table.rows] == list(rows) and {len(line) for line in table.rows} == {len(table.header)}
 
@@ -112,15 +115,20 @@ def test_unit_singular_laws_are_refused(assignments, key):
     assert key in fault and any(mend in fault for mend in ("must be", "give at least", "take fewer"))
 
 
-def test_command_line_exit_codes(monkeypatch, capsys):
-    """Command line: 0 where all is explained, 1 where a balance stays open; every reason is printed."""
-    monkeypatch.setattr("sys.argv", ["extremes.py", EXAMPLE])
+def test_command_line_exit_codes(monkeypatch):
+    """Command line: one JSON object; 0 where all is explained, 1 where a balance stays open."""
+    from typer.testing import CliRunner
+
+    from rbdyn.cli.app import app
+
     for status, code in ((CLOSED, 0), (REFUSED, 0), (OPEN, 1)):
         monkeypatch.setattr(
-            extremes, "battery", lambda scene, progress, status=status: [Ending("a case", (), status, "why")]
+            variants, "battery", lambda scene, progress, status=status: [Ending("a case", (), status, "why")]
         )
-        assert extremes.main(extremes.study, "about") == code
-        assert "a case: why" in capsys.readouterr().out
+        done = CliRunner().invoke(app, ["accuracy", EXAMPLE, "stability", "--json"])
+        assert done.exit_code == code and json.loads(done.stdout)["cases"][0]["status"] == status
+        shown = CliRunner().invoke(app, ["accuracy", EXAMPLE, "stability", "-q"])
+        assert shown.exit_code == code and "a case: why" in shown.stdout
 
 
 @pytest.mark.slow
@@ -132,17 +140,3 @@ def test_invariant_battery():
     assert rows["10 rpm"].method == rows["guide clearance of 1 um"].method == "rosenbrock"
     for row in rows.values():
         assert row.power_gap < 0.01, row.case
-
-
-@pytest.mark.parametrize(("oil_c", "budget", "is_film"), [(0.0, 20_000, True), (40.0, 1000, False)])
-def test_a_run_that_thick_oil_on_the_land_slows_says_so(oil_c, budget, is_film):
-    """Stiff: oil at 0 C on the guide land limits the steps, oil at 40 C does not."""
-    command = ["new", "NU2212", "--speed", "300", "--load", "8000", "--oil", "ISO VG 220"]
-    scene = Scene.from_dict(tomllib.loads(CliRunner().invoke(app, command).stdout))
-    sets = {"lubricant.temperature_C": oil_c, "numerics.step_budget_per_turn": budget, "numerics.turns": 2.0}
-    scene = scene.changed(sets | {"numerics.discard_turns": 0.0})
-    run = Run(scene, roller_bearing(scene), 0, scene.numerics.rtol, Stop())
-    with pytest.raises(RunError) as gave_up:
-        run.to(2.0)
-    film, law = "because the thick oil on the guide land damps the cage in ", "or soften the stiffest law"
-    assert (film in str(gave_up.value)) == is_film and (law in str(gave_up.value)) != is_film
