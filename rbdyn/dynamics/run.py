@@ -15,7 +15,6 @@ import numpy as np
 from rbdyn.base.arrays import Array
 from rbdyn.base.faults import MethodError, RunError
 from rbdyn.base.notes import Note, Notes
-from rbdyn.contact.cage_film import ShortJournalFilm, journal_film_force
 from rbdyn.dynamics.ensemble import Pace, Stop
 from rbdyn.dynamics.forces.cage import Impacts
 from rbdyn.dynamics.forces.equations import OF_MOTION, RollerBearing, mechanical_energy, without
@@ -38,9 +37,6 @@ from rbdyn.scene import Scene
 # A run looks for interruptions between so many steps: some hundredths of a second, half a second by the implicit method.
 STEPS_AT_ONCE = 10_000
 STATUSES = tuple(advance.Status)
-# Share of the mean eigenvalue that limits steps from which the film of the guide land is the cause: it has 0.45 to 0.76 of it in an
-# NU 2212 with ISO VG 220 at 0 to 20 C, which warmer oil cures, and 0.14 at 40 C, where the rollers limit the steps.
-FILM_LIMITED = 0.33
 LARGEST_STEP_TURNS = 0.02
 SMALLEST_STEP_TURNS = 1e-12
 
@@ -191,29 +187,12 @@ class Run:
         message, remedy = status.value
         component, step = name(int(self.carry.counts[advance.WORST]), self.layout), self.carry.clock[advance.STEP]
         reason = message.format(component=component, step=step, spent_s=self.spent_s, **self.control._asdict())
-        if status is advance.Status.STEP_BUDGET:
-            if self.scene.numerics.method in EXPLICIT:
-                remedy = f"take numerics.method = auto, {remedy}"
-            rate = self.land_film_rate()
-            if rate > FILM_LIMITED * largest_eigenvalue(self.carry.stiffness) > 0.0:
-                reason += f", because the thick oil on the guide land damps the cage in {1.0 / rate:.2g} s"
-                remedy = "warm or thin the oil, widen cage.guide_clearance_mm, or raise numerics.step_budget_per_turn"
+        if status is advance.Status.STEP_BUDGET and self.scene.numerics.method in EXPLICIT:
+            remedy = f"take numerics.method = auto, {remedy}"
         return (
             f"replicate {self.replicate + 1} (seed {self.scene.numerics.seed}) stopped at t = {time_s:.6g} s, shaft turn "
             f"{time_s / self.scene.turn_s:.4g}: {reason}; {remedy}"
         )
-
-    def land_film_rate(self) -> float:
-        """Rate at which the film of the guide land damps the cage where it is now [1/s]; zero without a film."""
-        film = getattr(self.bearing.guide, "film", None)
-        if not isinstance(film, ShortJournalFilm):
-            return 0.0
-        cage = self.layout.first_body + CAGE_X
-        ring = self.layout.first_body + RING_X if self.scene.cage.guidance == "inner" else self.layout.support
-        offset = self.carry.y[cage : cage + 2] - (0.0 if ring is None else self.carry.y[ring : ring + 2])
-        eccentricity = min(math.hypot(*offset) / film.clearance, film.largest_eccentricity)
-        closing, _ = journal_film_force(film.force_scale, eccentricity, 1.0, 0.0)
-        return -closing / (film.clearance * self.bearing.cage.mass)
 
 
 def with_numerics(scene: Scene, **changes: Any) -> Scene:
