@@ -54,6 +54,7 @@ EDGES = {
     "rbdyn/cli/": "speaks to people",
     "rbdyn/plots/": "speaks to people",
     "rbdyn/accuracy/coverage.py": "makes a scene of a scene",
+    "rbdyn/accuracy/variants.py": "makes scenes of a scene",
     "rbdyn/result.py": "is the saved record",
     "rbdyn/quasistatic/result.py": "is the saved record",
     "rbdyn/quasistatic/preload.py": "makes scenes of a scene",
