@@ -347,7 +347,7 @@ class Place(NamedTuple):
 
     def sentence(self, point: str) -> str:
         """Where the ``point`` of that name lies, in words; empty inside the region that the runs reach."""
-        ends = all_of(f"the {side} bound of {name}, {shown(bound)}" for name, (side, bound) in self.bounds.items())
+        ends = all_of(f"the {side} bound of {name} ({shown(bound)})" for name, (side, bound) in self.bounds.items())
         if ends and self.beyond:
             return f"{point} lies at {ends}, and farther out than any run: the surfaces extrapolate there."
         if ends:

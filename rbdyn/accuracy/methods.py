@@ -495,9 +495,8 @@ def conclusion(attempts: Sequence[Attempt], ratios: dict[str, Speedup], floor: f
             "greatest over the errors in common."
         )
     failed = {a.method: sum(b.method == a.method and b.status != OK for b in attempts) for a in attempts}
-    settings = ", ".join(f"{name} at {count}" for name, count in failed.items() if count)
-    if settings:
-        sentences.append(f"Failed settings: {settings}.")
+    if settings := [f"{count} of {name}" for name, count in failed.items() if count]:
+        sentences.append(f"Settings that failed: {'; '.join(settings)}.")
     sentences.append(f"Errors below {floor:.1g} m are not resolved and do not count.")
     return sentences
 

@@ -17,7 +17,7 @@ from doe.cli import app
 from doe.report.files import write
 from doe.workflow.confirmation import Confirmed, Limit, every_limit, limits_of, verdict_of
 from doe.workflow.front import ErrorField, Misses, find_front
-from doe.workflow.pick import edge_of, place_of, share_at_edge
+from doe.workflow.pick import Place, edge_of, place_of, share_at_edge
 from doe.workflow.problem import Problem
 from rbdyn.base.faults import InputError
 
@@ -272,3 +272,13 @@ def test_tries_end_where_the_next_best_point_was_simulated(tmp_path, monkeypatch
     front = find_front(outcome.study, [outcome.baseline, *named], outcome.tries)
     following = outcome.study.rounded_within(front.points[front.pick])
     assert any(np.array_equal(following, tried.point) for tried in named)
+
+
+def test_unit_bounds_of_several_factors_are_a_list():
+    """Unit: the value of a bound is in brackets, so that commas part the bounds alone."""
+    bounds = {"a": ("upper", 0.5), "b": ("lower", 0.25), "c": ("upper", 2.0)}
+    sentence = Place(bounds, False).sentence("The design")
+    assert (
+        sentence
+        == "The design lies at the upper bound of a (0.5), the lower bound of b (0.25) and the upper bound of c (2)."
+    )

@@ -176,7 +176,7 @@ def _reasons(summary: Summary) -> list[Block]:
 def _edge(edge: Edge) -> Paragraph:
     """Where the pick lies in the region; the change beyond a bound is in the section of the confirmation."""
     bounds = [
-        f"the {bound.side} bound of {name}, {shown(bound.bound)} {quantity(name)[1]}".rstrip()
+        f"the {bound.side} bound of {name} ({f'{shown(bound.bound)} {quantity(name)[1]}'.rstrip()})"
         for name, bound in edge.factors.items()
     ]
     if bounds:
