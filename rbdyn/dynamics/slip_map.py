@@ -16,7 +16,7 @@ import numpy as np
 from rbdyn.base.blocks import Column, Sheet
 from rbdyn.base.faults import MOST_VALUES, InputError, RunError, refuse
 from rbdyn.base.files import Checkpoint, code_version, run_key, versions
-from rbdyn.base.notes import Notes, status_of
+from rbdyn.base.notes import Notes
 from rbdyn.base.records import OverPoints, Record, derived, keyed, nullable, spread
 from rbdyn.base.words import Notice, all_of, quantity
 from rbdyn.contact.hertz_line import ROLLERS, pressure_notes
@@ -24,7 +24,7 @@ from rbdyn.dynamics.cage_verdict import verdict_of
 from rbdyn.dynamics.ensemble import Outcome, Pace, Reporter, Stop, in_turn, keys_of, log, plan_of, run_all, threads_of
 from rbdyn.dynamics.figures import DAMAGE, PANELS
 from rbdyn.dynamics.parameters.model import roller_bearing
-from rbdyn.dynamics.parameters.validity import heat_notes, limit_notes
+from rbdyn.dynamics.parameters.validity import heat_notes, limit_notes, status
 from rbdyn.dynamics.part_figures import part_figures
 from rbdyn.dynamics.recording import run_one
 from rbdyn.dynamics.run import prepare
@@ -217,7 +217,7 @@ class Series:
         damage = {figure.key: figures[figure.key] for figure in DAMAGE if figure.key in figures}
         shown = {panel.key: figures[panel.key] for panel in PANELS} | damage | parts
         speed, load, found = *_place(self.scene), verdict_of(self.scene, runs)
-        return Point(speed, load, status_of(notes), shown, power_gap, notes or None, found, self.at)
+        return Point(speed, load, status(self.scene, notes), shown, power_gap, notes or None, found, self.at)
 
     def _ended(self, plan: Companions | None) -> list[Replicate]:
         return [run for (owner, _), run in sorted(self.runs.items(), key=lambda item: item[0][1]) if owner == plan]

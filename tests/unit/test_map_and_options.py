@@ -110,6 +110,17 @@ def interrupt(done: int, total: int) -> None:
         raise KeyboardInterrupt
 
 
+def test_unit_a_point_whose_fits_close_the_clearance_fails(make_scene):
+    """Unit: a map says of a point what a simulation says of it; its results stay."""
+    sizes = {"bore_mm": 27, "outside_diameter_mm": 60, "width_mm": 11, "housing_diameter_mm": 90, "rotation": "false"}
+    parts = {f"{part}_temperature_C": 20 for part in ("outer_ring", "inner_ring", "roller", "cage")}
+    fits = {"inner_interference_um": 90, "outer_interference_um": 0}
+    sets = [f"mounting.{key}={value}" for key, value in (sizes | parts | fits).items()]
+    scene = make_scene("bearing.radial_clearance_mm=0.05", *sets)
+    (point,) = slip_map(scene, (24000.0,), (1300.0,), workers=1).failed
+    assert point.status == "lost clearance" and "cage_slip" in point.figures
+
+
 def test_unit_interrupted_map_goes_on_with_the_same_bits(outer, found, tmp_path, monkeypatch):
     """Unit: what was finished is not run again; figures equal those of an uninterrupted map to the last bit."""
     path = tmp_path / MAP_POINTS
