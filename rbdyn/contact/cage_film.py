@@ -35,6 +35,15 @@ class ShortJournalFilm(NamedTuple):
     largest_eccentricity: float  # 1 - floor/c [-]
 
 
+class StoppingFilm(NamedTuple):
+    """A film of thick oil, which stops the cage within a few vibrations of a contact; fields as in ``ShortJournalFilm``."""
+
+    force_scale: float
+    shear_scale: float
+    clearance: float
+    largest_eccentricity: float
+
+
 def short_journal_film(
     viscosity: float, radius: float, width: float, lands: int, clearance: float, floor: float, fill: float
 ) -> ShortJournalFilm:
@@ -47,11 +56,23 @@ def short_journal_film(
     )
 
 
+class JournalFilm(NamedTuple):
+    """Radial and tangential film force [N] on a journal, and by how much they fall per rate of the eccentricity [N s].
+
+    ``resist_rr``: of the radial force, per radial rate; ``resist_tt``: of the tangential one, per tangential rate; ``resist_rt``:
+    of either, per rate in the other direction.
+    """
+
+    radial: float
+    across: float
+    resist_rr: float
+    resist_rt: float
+    resist_tt: float
+
+
 @kernel
-def journal_film_force(
-    force_scale: float, eccentricity: float, radial_rate: float, wedge_rate: float
-) -> tuple[float, float]:
-    """Radial and tangential film force [N] on the journal of a short bearing without tension in the film.
+def journal_film_force(force_scale: float, eccentricity: float, radial_rate: float, wedge_rate: float) -> JournalFilm:
+    """``JournalFilm`` of a short bearing without tension in the film.
 
     ``eccentricity`` e/c < 1; ``radial_rate`` = d(eccentricity)/dt [1/s]; ``wedge_rate`` = eccentricity times
     (sum of the two spin rates - 2 whirl rate) [1/s]. Radial is along the eccentricity, tangential 90 degrees
@@ -59,12 +80,12 @@ def journal_film_force(
 
     The pressure of the short bearing has the sign of 2 radial_rate cos(theta) - wedge_rate sin(theta), which is positive on
     exactly half the circle. Over that half all integrals are elementary in Sommerfeld's angle gamma. With radial_rate = 0 the
-    result is Ocvirk's half-film.
+    result is Ocvirk's half-film. The pressure vanishes at the ends of that half, so their motion adds nothing to the resistance.
     """
     a, b = 2.0 * radial_rate, -wedge_rate
     size = math.sqrt(a * a + b * b)
     if size == 0.0:
-        return 0.0, 0.0
+        return JournalFilm(0.0, 0.0, 0.0, 0.0, 0.0)
     # The half circle of positive pressure starts at theta_1, where (cos, sin) = (b, -a)/size, ends opposite.
     inverse_size = 1.0 / size
     cos_1, sin_1 = b * inverse_size, -a * inverse_size
@@ -86,7 +107,18 @@ def journal_film_force(
     integral_sc = mixed * inverse * inverse
     integral_ss = across * inverse * inverse_root
     half = -0.5 * force_scale
-    return half * (a * integral_cc + b * integral_sc), half * (a * integral_sc + b * integral_ss)
+    return JournalFilm(
+        half * (a * integral_cc + b * integral_sc),
+        half * (a * integral_sc + b * integral_ss),
+        force_scale * integral_cc,
+        force_scale * integral_sc,
+        force_scale * integral_ss,
+    )
+
+
+def stopping_rate(film: ShortJournalFilm, mass: float) -> float:
+    """Sum of the rates at which a film stops a concentric journal of ``mass`` [kg] along and across its motion [1/s]."""
+    return math.pi * film.force_scale / (film.clearance * mass)
 
 
 class PocketFilm(NamedTuple):

@@ -137,6 +137,6 @@ def test_invariant_battery():
     rows = {row.case: row for row in battery(Scene.load(EXAMPLE))}
     assert [row.case for row in rows.values() if row.unexplained] == []
     assert [row.case for row in rows.values() if row.status in (STOPPED, REFUSED)] == []
-    assert rows["10 rpm"].method == rows["guide clearance of 1 um"].method == "rosenbrock"
+    assert rows["10 rpm"].method == "rosenbrock" and rows["guide clearance of 1 um"].method == "verlet"
     for row in rows.values():
         assert row.power_gap < 0.01, row.case

@@ -9,7 +9,7 @@ import math
 from typing import Any, NamedTuple
 
 from rbdyn.compiled.kernel import kernel, law_of
-from rbdyn.contact.cage_film import PocketFilm, ShortJournalFilm, journal_film_force, wall_film
+from rbdyn.contact.cage_film import PocketFilm, ShortJournalFilm, StoppingFilm, journal_film_force, wall_film
 from rbdyn.contact.damping import damped_load
 from rbdyn.contact.hertz_line import root_stiffness, whole_energy, whole_load
 from rbdyn.contact.traction import traction
@@ -318,7 +318,10 @@ class InnerGuide(NamedTuple):
 
 
 class JournalWrench(NamedTuple):
-    """Force on the journal [N], moments on journal and bearing [N m], dry load [N], powers lost [W]."""
+    """Force on the journal [N], moments on journal and bearing [N m], dry load [N], powers lost [W], and ``resist_*`` of the film.
+
+    By ``resist_xy`` the force of the film along x falls per speed along y, and that along y per speed along x [N s/m].
+    """
 
     x: float
     y: float
@@ -328,10 +331,13 @@ class JournalWrench(NamedTuple):
     film: float
     friction: float
     damping: float
+    resist_xx: float
+    resist_xy: float
+    resist_yy: float
 
 
 class LandForces(NamedTuple):
-    """Forces [N] and moments [N m] on cage, inner and outer ring, dry load [N], powers lost [W]."""
+    """Forces [N] and moments [N m] on cage, inner and outer ring, dry load [N], powers lost [W], ``resist_*`` as in ``JournalWrench``."""
 
     cage_x: float
     cage_y: float
@@ -346,6 +352,9 @@ class LandForces(NamedTuple):
     film: float
     friction: float
     damping: float
+    resist_xx: float
+    resist_xy: float
+    resist_yy: float
 
 
 @law_of(NoFilm)
@@ -354,36 +363,63 @@ def film_wrench(film, ex, ey, e, evx, evy, journal_speed, bearing_speed):
 
     ``ex, ey, e``: direction and size [m] of the journal's offset; ``evx, evy``: its velocity [m/s].
     """
-    return JournalWrench(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    return JournalWrench(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
-@film_wrench.body(ShortJournalFilm)
+@film_wrench.body(ShortJournalFilm, StoppingFilm)
 def _(film, ex, ey, e, evx, evy, journal_speed, bearing_speed):
     per_clearance = 1.0 / film.clearance
     eccentricity = min(e * per_clearance, film.largest_eccentricity)
     radial_rate = (evx * ex + evy * ey) * per_clearance
     whirl_rate = 2.0 * (evy * ex - evx * ey) * per_clearance
     wedge_rate = eccentricity * (journal_speed + bearing_speed) - whirl_rate
-    radial, across = journal_film_force(film.force_scale, eccentricity, radial_rate, wedge_rate)
+    pushed = journal_film_force(film.force_scale, eccentricity, radial_rate, wedge_rate)
+    radial, across = pushed.radial, pushed.across
     shear = film.shear_scale * (journal_speed - bearing_speed) / math.sqrt(1.0 - eccentricity * eccentricity)
     fx, fy = radial * ex - across * ey, radial * ey + across * ex
     journal_moment = -shear - 0.5 * e * across
     bearing_moment = shear - 0.5 * e * across
     power = -(fx * evx + fy * evy + journal_moment * journal_speed + bearing_moment * bearing_speed)
-    return JournalWrench(fx, fy, journal_moment, bearing_moment, 0.0, power, 0.0, 0.0)
+    resist_rr, resist_tt = pushed.resist_rr * per_clearance, pushed.resist_tt * per_clearance
+    resist_rt = pushed.resist_rt * per_clearance
+    both = 2.0 * ex * ey * resist_rt
+    return JournalWrench(
+        fx,
+        fy,
+        journal_moment,
+        bearing_moment,
+        0.0,
+        power,
+        0.0,
+        0.0,
+        ex * ex * resist_rr - both + ey * ey * resist_tt,
+        ex * ey * (resist_rr - resist_tt) + (ex * ex - ey * ey) * resist_rt,
+        ey * ey * resist_rr + both + ex * ex * resist_tt,
+    )
+
+
+@law_of(NoFilm, ShortJournalFilm)
+def stops_cage(film):
+    """Whether a film stops the cage so fast that its resistance is needed."""
+    return False
+
+
+@stops_cage.body(StoppingFilm)
+def _(film):
+    return True
 
 
 @law_of(NoContact)
 def dry_wrench(dry, radius, ex, ey, e, evx, evy, journal_speed, bearing_speed):
     """``JournalWrench`` of the contact, without a film."""
-    return JournalWrench(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    return JournalWrench(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 @dry_wrench.body(DryContact)
 def _(dry, radius, ex, ey, e, evx, evy, journal_speed, bearing_speed):
     approach = e - dry.play
     if approach <= 0.0:
-        return JournalWrench(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+        return JournalWrench(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     approach_rate = evx * ex + evy * ey
     elastic, stiffness = whole_load(dry.contact, approach)
     root = root_stiffness(dry.contact, stiffness, approach)
@@ -399,6 +435,9 @@ def _(dry, radius, ex, ey, e, evx, evy, journal_speed, bearing_speed):
         0.0,
         friction * slip,
         (load - elastic) * approach_rate,
+        0.0,
+        0.0,
+        0.0,
     )
 
 
@@ -419,13 +458,19 @@ def journal_wrench(guide, dx, dy, dvx, dvy, journal_speed, bearing_speed):
         film.film,
         dry.friction,
         dry.damping,
+        film.resist_xx,
+        film.resist_xy,
+        film.resist_yy,
     )
 
 
 @law_of(NoGuide)
 def guide_forces(guide, cage, inner, outer):
     """Land forces, from the motions (``RingMotion``) of cage, inner and outer ring."""
-    return LandForces(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    return LandForces(
+        0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0,
+        0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0,
+    )  # fmt: skip
 
 
 @guide_forces.body(OuterGuide)
@@ -434,7 +479,7 @@ def _(guide, cage, inner, outer):
     on = journal_wrench(guide, dx, dy, dvx, dvy, cage.speed, outer.speed)
     return LandForces(
         on.x, on.y, on.journal_moment, 0.0, 0.0, 0.0, -on.x, -on.y, on.bearing_moment,
-        on.load, on.film, on.friction, on.damping,
+        on.load, on.film, on.friction, on.damping, on.resist_xx, on.resist_xy, on.resist_yy,
     )  # fmt: skip
 
 
@@ -444,8 +489,19 @@ def _(guide, cage, inner, outer):
     on = journal_wrench(guide, dx, dy, dvx, dvy, inner.speed, cage.speed)
     return LandForces(
         -on.x, -on.y, on.bearing_moment, on.x, on.y, on.journal_moment, 0.0, 0.0, 0.0,
-        on.load, on.film, on.friction, on.damping,
+        on.load, on.film, on.friction, on.damping, on.resist_xx, on.resist_xy, on.resist_yy,
     )  # fmt: skip
+
+
+@law_of(NoGuide)
+def has_stopping_film(guide):
+    """Whether the film of the guide ``stops_cage``."""
+    return False
+
+
+@has_stopping_film.body(OuterGuide, InnerGuide)
+def _(guide):
+    return stops_cage(guide.film)
 
 
 @law_of(NoContact)

@@ -15,7 +15,14 @@ from rbdyn.compiled.elementary import fast_cos_sin
 from rbdyn.compiled.kernel import entry, kernel, routine
 from rbdyn.contact.hertz_line import line_energy, line_load
 from rbdyn.dynamics.forces import bodies, state
-from rbdyn.dynamics.forces.cage import guide_energy, guide_forces, pocket_contact, pocket_energy, pocket_gap
+from rbdyn.dynamics.forces.cage import (
+    guide_energy,
+    guide_forces,
+    has_stopping_film,
+    pocket_contact,
+    pocket_energy,
+    pocket_gap,
+)
 from rbdyn.dynamics.forces.race_lanes import race_forces, with_open_films
 from rbdyn.dynamics.forces.races import Race, form_at, roller_radius
 from rbdyn.losses import (
@@ -264,6 +271,9 @@ def derivative(bearing, y, row, dy, power, loads, scratch):
     touching = touching_rollers(bearing, cage, y, scratch)
     # Two long chains of roots and quotients, which take little more time together than one.
     land = guide_forces(bearing.guide, cage, inner, outer)
+    if has_stopping_film(bearing.guide):
+        resist = scratch.resistance
+        resist[0, 0], resist[0, 1], resist[0, 2] = land.resist_xx, land.resist_xy, land.resist_yy
     pockets = pocket_forces(bearing, cage, touching, y, row, dy, scratch)
     on_outer, on_inner = race_forces(bearing.outer, bearing.inner, bearing.sizes, outer, inner, z, y, row, dy, scratch)
     on_inner = with_open_films(bearing.open_film, on_inner, bearing.inner, bearing.sizes, inner, z, y, row, dy, scratch)

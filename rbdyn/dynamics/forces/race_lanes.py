@@ -80,6 +80,8 @@ class Scratch(NamedTuple):
     roller: NDArray[np.int64]  # (LANES,) number of each packed roller
     gap: NDArray[np.float64]  # (rollers,) gap of each in its pocket [m], or less its contact load there [N]
     touching: NDArray[np.int64]  # (rollers,) numbers of those that touch theirs
+    # (2, 3) of a ``StoppingFilm``: xx, xy and yy of ``LandForces`` [N s/m], latest and at the start of a step
+    resistance: NDArray[np.float64]
 
 
 def scratch(rollers: int) -> Scratch:
@@ -91,6 +93,7 @@ def scratch(rollers: int) -> Scratch:
         np.zeros(LANES, np.int64),
         np.empty(rollers),
         np.zeros(rollers, np.int64),
+        np.zeros((2, 3)),
     )
 
 

@@ -21,6 +21,8 @@ mu_1 = mu_0 + h/2 (g_0 + g_1) with g_1 = g(x_1, v*, mu_1). Relaxation alone is t
 that of v* and not of v_1, so that the vibration of slip against spring is stable up to h omega = 1.2 to 1.5, for the damping
 ratios 0.05 to 0.17 of loaded contacts. With the usual v* this is 0.7 to 1.3.
 
+A cage that thick oil stops on its land within a step has implicit speeds (``stopped_cage``).
+
 Rollers run round the bearing. Coordinates stay in fixed axes, where h v_0 overshoots the orbit. With the angle phi of the orbit in
 a step, (1 - phi^2/6) h v_0 takes its place.
 
@@ -35,10 +37,20 @@ from rbdyn.compiled.kernel import kernel, law_of, routine
 from rbdyn.contact.tangential import half_step_ahead, spin_lookahead, staggered
 from rbdyn.dynamics.forces import state
 from rbdyn.dynamics.forces.bodies import HeldRing, SupportedRing
+from rbdyn.dynamics.forces.cage import has_stopping_film
 from rbdyn.dynamics.forces.equations import RollerBearing, derivative, derivative_once, roller_count
 from rbdyn.dynamics.forces.races import with_laws
 from rbdyn.dynamics.integrators import advance as laws
 from rbdyn.dynamics.integrators.advance import BEFORE, DERIVATIVES, EIGENVALUES, GROW, LIMITED, STEP, TESTED
+from rbdyn.dynamics.integrators.stopped_cage import (
+    AT_START,
+    STIFF,
+    cage_of,
+    correct_cage,
+    keep_resistance,
+    predict_cage,
+    stop_in_step,
+)
 
 # Rows of ``Carry.k``: rates at the start and at the end of the step and at the start of the step before, then the errors.
 START, END, PAST, ERROR = range(4)
@@ -161,8 +173,11 @@ def look_ahead(first, stop, h, ahead, y, k, end):
 
 
 @kernel
-def predict(bearing, h, before, y, k, end):
-    """State at which the rates of the end are evaluated; traction coefficients without the half step of those rates."""
+def predict(bearing, film_stops, scratch, h, before, y, k, end):
+    """State at which the rates of the end are evaluated; traction coefficients without the half step of those rates.
+
+    ``film_stops``: whether the film of the land stops the cage within the step.
+    """
     z, n = roller_count(bearing), y.size
     angle = h * y[state.ROLLER_STATES * z + state.CAGE_SPEED]
     ratio = min(h / before, LONGEST_RATIO)
@@ -171,17 +186,22 @@ def predict(bearing, h, before, y, k, end):
     look_ahead(5 * z, n, h, 0.5 * h * ratio, y, k, end)
     move(0, 2 * z, 2 * z, h * (1.0 - angle * angle / 6.0), h, y, k, end)
     move_bodies(bearing, h, y, k, end)
+    if film_stops:
+        predict_cage(bearing, scratch, h, y, k, end)
     half_step_ahead(bearing.outer.tangential, z, 0.5 * h, y, k, START, end)
     half_step_ahead(bearing.inner.tangential, z, 0.5 * h, y, k, START, end)
 
 
 @kernel
-def correct(bearing, h, before, y, k, end):
+def correct(bearing, film_stops, scratch, h, before, y, k, end):
     """State at the end of the step, and the errors."""
     z, n = roller_count(bearing), y.size
+    predicted = cage_of(bearing, end)
     for i in range(2 * z, n):
         end[i] = y[i] + 0.5 * h * (k[START, i] + k[END, i])
     move_bodies(bearing, h, y, k, end)
+    if film_stops:
+        correct_cage(bearing, scratch, h, y, k, predicted, end)
     # After a step cut short the difference before it would be round-off.
     change = h * h / (6.0 * (h + before))
     change_before = change * min(h / before, GROW)
@@ -200,16 +220,18 @@ def _(method, bearing, y, k, power, loads, scratch, clock, counts):
         counts[DERIVATIVES] = 1
         for i in range(y.size):
             k[PAST, i] = k[START, i]
+        keep_resistance(scratch)
         clock[BEFORE] = clock[STEP]
     return -1
 
 
 @laws.trial_step.body(Verlet)
 def _(method, refused, bearing, y, k, stage, power, loads, scratch, clock, counts, h):
-    predict(bearing, h, clock[BEFORE], y, k, stage)
+    film_stops = has_stopping_film(bearing.guide) and stop_in_step(bearing, scratch, AT_START, h) > STIFF
+    predict(bearing, film_stops, scratch, h, clock[BEFORE], y, k, stage)
     derivative(staggered_bearing(bearing, 0.5 * h), stage, END, k, power, loads, scratch)
     counts[DERIVATIVES] += 1
-    correct(bearing, h, clock[BEFORE], y, k, stage)
+    correct(bearing, film_stops, scratch, h, clock[BEFORE], y, k, stage)
 
 
 @laws.error_norm.body(Verlet)
@@ -256,6 +278,7 @@ def compare_changes(method, k, stiffness, h, inverse_tolerance):
 def _(method, bearing, stage, k, power, loads, scratch, counts):
     for i in range(stage.size):
         k[PAST, i] = k[START, i]
+    keep_resistance(scratch)
 
 
 @laws.interpolate.body(Verlet)

@@ -1,0 +1,94 @@
+"""A cage that thick oil stops within a step: resistance of the film, decay, order, price, and where no scene pays for it."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from smooth_runs import fixed_step, run_of
+from test_runge_kutta import slope_of
+
+from rbdyn.contact.cage_film import ShortJournalFilm, StoppingFilm, stopping_rate
+from rbdyn.dynamics.forces.cage import film_wrench
+from rbdyn.dynamics.integrators import advance as at
+from rbdyn.dynamics.integrators import stopped_cage
+from rbdyn.dynamics.parameters.model import roller_bearing
+from rbdyn.dynamics.parameters.state import layout_of
+
+COLD = "lubricant.temperature_C=-40"
+FILM = ShortJournalFilm(2.0, 0.1, 75e-6, 0.96)
+
+
+@given(angle=st.floats(0.0, 6.3), share=st.floats(0.01, 0.9), course=st.floats(0.0, 6.3), speed=st.floats(1e-3, 1.0))
+@settings(max_examples=100, deadline=None)
+def test_oracle_resistance_of_the_film(angle, share, course, speed):
+    """Oracle: the resistance is less the slope of the film's force over the velocity, by central differences."""
+    ex, ey, e = math.cos(angle), math.sin(angle), share * FILM.clearance
+    vx, vy, small = speed * math.cos(course), speed * math.sin(course), 1e-5 * speed
+
+    def at_velocity(vx, vy):
+        return film_wrench(FILM, ex, ey, e, vx, vy, 300.0, 0.0)
+
+    found = at_velocity(vx, vy)
+    along_x, along_y = (
+        np.array([(b.x - a.x) / (2.0 * small), (b.y - a.y) / (2.0 * small)])
+        for a, b in (
+            (at_velocity(vx - small, vy), at_velocity(vx + small, vy)),
+            (at_velocity(vx, vy - small), at_velocity(vx, vy + small)),
+        )
+    )
+    size = found.resist_xx + found.resist_yy
+    assert -along_x == pytest.approx([found.resist_xx, found.resist_xy], abs=1e-3 * size)
+    assert -along_y == pytest.approx([found.resist_xy, found.resist_yy], abs=1e-3 * size)
+    assert found.resist_xx * found.resist_yy > found.resist_xy**2
+
+
+def test_oracle_decay_in_a_film(make_scene):
+    """Oracle: a free cage in a film of constant resistance decays by Pade's approximation, to zero in the longest steps."""
+    bearing = roller_bearing(make_scene(COLD))
+    mass, body = bearing.cage.mass, 5 * bearing.rollers
+    for stiffness in (0.3, 2.0, 30.0, 1e6):
+        h = 1e-6
+        rate = stiffness / h
+        work = at.carry_from(np.zeros(body + 10), bearing.rollers, h, None).scratch
+        # The film resists along x alone, so its trace is the rate.
+        work.resistance[:] = mass * rate, 0.0, 0.0
+        y, k = np.zeros(body + 10), np.zeros((at.ROWS, body + 10))
+        end, speed = y.copy(), body + stopped_cage.state.CAGE_VX
+        y[speed], k[0, speed] = 1.0, -rate
+        stopped_cage.predict_cage.py_func(bearing, work, h, y, k, end)
+        predicted = stopped_cage.cage_of.py_func(bearing, end)
+        k[1, speed] = -rate * end[speed]
+        stopped_cage.correct_cage.py_func(bearing, work, h, y, k, predicted, end)
+        pade = (6.0 - 2.0 * stiffness) / (6.0 + 4.0 * stiffness + stiffness**2)
+        assert end[speed] == pytest.approx(pade, abs=1e-9)
+        assert k[1, speed] == pytest.approx(-rate * pade, rel=1e-6, abs=1e-9 * rate)
+
+
+def test_rate_order_two_in_a_film(make_scene):
+    """Rate: errors of the cage's speeds fall with the square of the step, through steps in which the film stops it."""
+    scene, duration, steps = make_scene(COLD), 3.2e-5, np.array([3.2e-5 / n for n in (16, 24, 32, 48)])
+    film = roller_bearing(scene).guide.film
+    assert isinstance(film, StoppingFilm) and stopping_rate(film, scene.cage.mass) * steps[-1] > stopped_cage.STIFF
+    reference = fixed_step(scene, duration / 4096, duration, "verlet")
+    first = layout_of(scene).first_body + stopped_cage.state.CAGE_VX
+    errors = [np.abs(fixed_step(scene, h, duration, "verlet") - reference)[first : first + 2].max() for h in steps]
+    assert slope_of(steps, np.array(errors)) > 1.7
+
+
+def test_unit_cold_bearings_cost_no_more(make_scene):
+    """Unit: the film of oil at -54 C leaves the steps to the contacts; explicit ones end at a product of 1 with its rates."""
+    scene = make_scene("lubricant.temperature_C=-54")
+    run = run_of(scene, 1e-2, "verlet")
+    run.to(0.5)
+    fewest = stopping_rate(roller_bearing(scene).guide.film, scene.cage.mass) * run.carry.clock[at.NOW]
+    assert run.steps < 0.4 * fewest
+
+
+def test_unit_warm_bearings_leave_it_out(make_scene):
+    """Unit: at working temperature no film stops the cage within a step, so that no code for it is compiled."""
+    assert isinstance(roller_bearing(make_scene()).guide.film, ShortJournalFilm)
+    assert isinstance(roller_bearing(make_scene(COLD)).guide.film, StoppingFilm)
