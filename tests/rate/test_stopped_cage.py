@@ -12,6 +12,7 @@ from smooth_runs import fixed_step, run_of
 from test_runge_kutta import slope_of
 
 from rbdyn.contact.cage_film import ShortJournalFilm, StoppingFilm, stopping_rate
+from rbdyn.dynamics.forces import state
 from rbdyn.dynamics.forces.cage import film_wrench
 from rbdyn.dynamics.integrators import advance as at
 from rbdyn.dynamics.integrators import stopped_cage
@@ -46,26 +47,47 @@ def test_oracle_resistance_of_the_film(angle, share, course, speed):
     assert found.resist_xx * found.resist_yy > found.resist_xy**2
 
 
-def test_oracle_decay_in_a_film(make_scene):
-    """Oracle: a free cage in a film of constant resistance decays by Pade's approximation, to zero in the longest steps."""
-    bearing = roller_bearing(make_scene(COLD))
-    mass, body = bearing.cage.mass, 5 * bearing.rollers
+SUPPORT = ("support.outer_ring_mass_kg=0.4", "support.stiffness_N_m=5e7", "support.damping_N_s_m=2e3")
+
+
+def resist(film, rates, cage, ring, speeds):
+    """Write the rates of cage and ring in a film of such a resistance [N s/m] along x; returns the relative speed."""
+    mass, resistance = film
+    moving = speeds[cage] - (speeds[ring.speed] if ring.speed >= 0 else 0.0)
+    rates[cage] = -resistance * moving / mass
+    if ring.speed >= 0:
+        rates[ring.speed] = resistance * moving * ring.per_mass
+    return moving
+
+
+@pytest.mark.parametrize("sets", [(), ("cage.guidance=inner",), SUPPORT])
+def test_oracle_decay_in_a_film(make_scene, sets):
+    """Oracle: cage and ring in a film of constant resistance decay by Pade's approximation, to zero in the longest steps, and keep
+    their momentum.
+    """
+    bearing = roller_bearing(make_scene(COLD, *sets))
+    mass, z = bearing.cage.mass, bearing.rollers
+    n, h = 5 * z + 20, 1e-6
+    ring = stopped_cage.partner_of(bearing.guide, bearing)
+    cage = 5 * z + state.CAGE_VX
+    per_mass = 1.0 / mass + ring.per_mass
     for stiffness in (0.3, 2.0, 30.0, 1e6):
-        h = 1e-6
         rate = stiffness / h
-        work = at.carry_from(np.zeros(body + 10), bearing.rollers, h, None).scratch
+        work = at.carry_from(np.zeros(n), z, h, None).scratch
         # The film resists along x alone, so its trace is the rate.
-        work.resistance[:] = mass * rate, 0.0, 0.0
-        y, k = np.zeros(body + 10), np.zeros((at.ROWS, body + 10))
-        end, speed = y.copy(), body + stopped_cage.state.CAGE_VX
-        y[speed], k[0, speed] = 1.0, -rate
+        work.resistance[:] = rate / per_mass, 0.0, 0.0
+        y, k, end = np.zeros(n), np.zeros((at.ROWS, n)), np.zeros(n)
+        y[cage], film = 1.0, (mass, rate / per_mass)
+        resist(film, k[0], cage, ring, y)
         stopped_cage.predict_cage.py_func(bearing, work, h, y, k, end)
-        predicted = stopped_cage.cage_of.py_func(bearing, end)
-        k[1, speed] = -rate * end[speed]
-        stopped_cage.correct_cage.py_func(bearing, work, h, y, k, predicted, end)
+        resist(film, k[1], cage, ring, end)
+        stopped_cage.correct_cage.py_func(bearing, work, h, y, k, end)
         pade = (6.0 - 2.0 * stiffness) / (6.0 + 4.0 * stiffness + stiffness**2)
-        assert end[speed] == pytest.approx(pade, abs=1e-9)
-        assert k[1, speed] == pytest.approx(-rate * pade, rel=1e-6, abs=1e-9 * rate)
+        kept = k[1].copy()
+        assert resist(film, k[1], cage, ring, end) == pytest.approx(pade, abs=1e-9)
+        assert kept == pytest.approx(k[1], rel=1e-6, abs=1e-9 * rate)
+        if ring.speed >= 0:
+            assert mass * end[cage] + end[ring.speed] / ring.per_mass == pytest.approx(mass, rel=1e-9)
 
 
 def test_rate_order_two_in_a_film(make_scene):
@@ -74,7 +96,7 @@ def test_rate_order_two_in_a_film(make_scene):
     film = roller_bearing(scene).guide.film
     assert isinstance(film, StoppingFilm) and stopping_rate(film, scene.cage.mass) * steps[-1] > stopped_cage.STIFF
     reference = fixed_step(scene, duration / 4096, duration, "verlet")
-    first = layout_of(scene).first_body + stopped_cage.state.CAGE_VX
+    first = layout_of(scene).first_body + state.CAGE_VX
     errors = [np.abs(fixed_step(scene, h, duration, "verlet") - reference)[first : first + 2].max() for h in steps]
     assert slope_of(steps, np.array(errors)) > 1.7
 

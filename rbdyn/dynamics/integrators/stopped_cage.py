@@ -1,29 +1,73 @@
 """A cage that the oil film of its land stops within a step of ``verlet``: its speeds are implicit in that film.
 
-The film of a land resists the motion of the cage's centre with a force C v, so that it stops a cage of mass m at rates D = C/m.
-In thick oil these are the fastest of a bearing: 1.4e6 1/s in an NU 2212 at 300 rpm in oil of VG 220 at 0 C, where contacts
-vibrate at 3e5 rad/s. An explicit step would have to be shorter than 1/2 over them. From the forces with the speeds v* predicted,
-and with the share theta of the rates at the end, one iteration of Newton's method gives
+The film of a land resists the relative motion u of cage and ring with a force C u. So it stops them at rates D = C (1/m + 1/M), with the
+masses m of the cage and M of the ring, infinite where that is held. In thick oil these are the fastest of a bearing: 1.4e6 1/s in an
+NU 2212 at 300 rpm in oil of VG 220 at 0 C, where contacts vibrate at 3e5 rad/s. An explicit step would have to be shorter than 1/2
+over them. From the forces with the speeds v* predicted, and with the share theta of the rates at the end, one iteration of Newton's
+method gives for the relative motion
 
-    v* = v_0 + (I + theta h D_0)^-1 h a_0,        x_1 = x_0 + h (v_0 + v*)/2,
-    d = (I + theta h D_1)^-1 (v_0 + h (1 - theta) a_0 + h theta a_1* - v*),
-    v_1 = v* + d,        a_1 = a_1* - D_1 d.
+    u* = u_0 + (I + theta h D_0)^-1 h a_0,
+    d = (I + theta h D_1)^-1 (u_0 + h (1 - theta) a_0 + h theta a_1* - u*),
+    u_1 = u* + d,        a_1 = a_1* - D_1 d.
 
-With theta = (3 + z)/(6 + z), z = h tr D, a constant rate z/h stops by (6 - 2 z)/(6 + 4 z + z^2), Pade's approximation of exp(-z):
-exact to third order, and zero at infinity (Hairer and Wanner, Solving ODEs II, IV.3). Bodies on the other side of the film are
-heavier, and explicit.
+Each body has its share of these changes, so that their momentum remains, and moves by x_1 = x_0 + h (v_0 + v*)/2. With
+theta = (3 + z)/(6 + z), z = h tr D, a constant rate z/h stops by (6 - 2 z)/(6 + 4 z + z^2), Pade's approximation of exp(-z): exact to
+third order, and zero at infinity (Hairer and Wanner, Solving ODEs II, IV.3).
 """
 
-from rbdyn.compiled.kernel import kernel
+from typing import NamedTuple
+
+from rbdyn.compiled.kernel import kernel, law_of
 from rbdyn.dynamics.forces import state
+from rbdyn.dynamics.forces.bodies import HeldRing, SupportedRing
+from rbdyn.dynamics.forces.cage import InnerGuide, NoGuide, OuterGuide
 from rbdyn.dynamics.forces.equations import roller_count
 
 # h tr D above which the speeds are implicit. Below, the formulas of ``verlet`` are stable.
 STIFF = 0.25
 # Rows of ``Scratch.resistance``: at the latest right-hand side, and at the start of the step.
 LATEST, AT_START = range(2)
-# Rows of ``Carry.k``, as in ``verlet``.
-START, END = range(2)
+# Rows of ``Carry.k``, as in ``verlet``, and a free one for the predicted state.
+START, END, PREDICTED = 0, 1, 4
+
+
+class Partner(NamedTuple):
+    """The ring on the other side of the film: places of its centre and of that one's speed in the state, and 1/mass [1/kg].
+
+    A held ring has the place -1.
+    """
+
+    place: int
+    speed: int
+    per_mass: float
+
+
+@law_of(HeldRing)
+def outer_partner(ring):
+    """The outer ring as a ``Partner``."""
+    return Partner(-1, -1, 0.0)
+
+
+@outer_partner.body(SupportedRing)
+def _(ring):
+    return Partner(ring.start + state.SUPPORT_X, ring.start + state.SUPPORT_VX, 1.0 / ring.mass)
+
+
+@law_of(NoGuide)
+def partner_of(guide, bearing):
+    """The ``Partner`` of the cage."""
+    return Partner(-1, -1, 0.0)
+
+
+@partner_of.body(OuterGuide)
+def _(guide, bearing):
+    return outer_partner(bearing.outer_ring)
+
+
+@partner_of.body(InnerGuide)
+def _(guide, bearing):
+    body = state.ROLLER_STATES * roller_count(bearing)
+    return Partner(body + state.RING_X, body + state.RING_VX, 1.0 / bearing.inner_ring_mass)
 
 
 @kernel
@@ -36,7 +80,8 @@ def keep_resistance(scratch):
 @kernel
 def stop_in_step(bearing, scratch, row, h):
     """h tr D of a step of ``h`` [s]."""
-    return h * (scratch.resistance[row, 0] + scratch.resistance[row, 2]) / bearing.cage.mass
+    per_mass = 1.0 / bearing.cage.mass + partner_of(bearing.guide, bearing).per_mass
+    return h * per_mass * (scratch.resistance[row, 0] + scratch.resistance[row, 2])
 
 
 @kernel
@@ -47,49 +92,67 @@ def share_at_end(bearing, scratch, row, h):
 
 
 @kernel
-def stopped(bearing, scratch, row, duration, x, y):
-    """(I + D times the ``duration`` [s])^-1 (x, y)."""
-    per_mass = duration / bearing.cage.mass
-    xx, xy = 1.0 + per_mass * scratch.resistance[row, 0], per_mass * scratch.resistance[row, 1]
-    yy = 1.0 + per_mass * scratch.resistance[row, 2]
-    inverse = 1.0 / (xx * yy - xy * xy)
-    return inverse * (yy * x - xy * y), inverse * (xx * y - xy * x)
+def film_impulse(bearing, scratch, row, duration, x, y):
+    """Impulse [N s] of the film in a ``duration`` [s], where ``x, y`` is the change of u without it: C (I + D duration)^-1 (x, y) duration."""
+    per_mass = duration * (1.0 / bearing.cage.mass + partner_of(bearing.guide, bearing).per_mass)
+    resist_xx, resist_xy, resist_yy = scratch.resistance[row, 0], scratch.resistance[row, 1], scratch.resistance[row, 2]
+    xx, xy, yy = 1.0 + per_mass * resist_xx, per_mass * resist_xy, 1.0 + per_mass * resist_yy
+    inverse = duration / (xx * yy - xy * xy)
+    ux, uy = inverse * (yy * x - xy * y), inverse * (xx * y - xy * x)
+    return resist_xx * ux + resist_xy * uy, resist_xy * ux + resist_yy * uy
 
 
 @kernel
-def cage_of(bearing, y):
-    """Centre of the cage in a state, x and y [m], and its velocity [m/s]."""
-    body = state.ROLLER_STATES * roller_count(bearing)
-    return y[body + state.CAGE_X], y[body + state.CAGE_Y], y[body + state.CAGE_VX], y[body + state.CAGE_VY]
+def predict_body(place, speed, per_mass, h, impulse, start, k, end):
+    """Predict a body at the end of a step of ``h`` [s] on which its present rates and the ``impulse`` [N s] act."""
+    for axis in range(2):
+        change = h * k[START, speed + axis] + per_mass * impulse[axis]
+        end[speed + axis] = start[speed + axis] + change
+        end[place + axis] = start[place + axis] + h * (start[speed + axis] + 0.5 * change)
 
 
 @kernel
-def keep_cage(bearing, x, y, vx, vy, end):
-    """Write what ``cage_of`` returns to a state."""
-    body = state.ROLLER_STATES * roller_count(bearing)
-    end[body + state.CAGE_X], end[body + state.CAGE_Y] = x, y
-    end[body + state.CAGE_VX], end[body + state.CAGE_VY] = vx, vy
+def correct_body(place, speed, per_mass, share, h, impulse, start, k, end):
+    """Correct speed and rate of a body at the end of a step of ``h`` [s] by the ``impulse`` [N s]; its place is as predicted."""
+    for axis in range(2):
+        i = speed + axis
+        push = per_mass * impulse[axis]
+        end[i] = start[i] + (h * ((1.0 - share) * k[START, i] + share * k[END, i]) + push)
+        k[END, i] += push / (share * h)
+        end[place + axis] = k[PREDICTED, place + axis]
+
+
+@kernel
+def missing(i, share, h, start, k):
+    """What a predicted speed lacks."""
+    return start[i] - k[PREDICTED, i] + h * ((1.0 - share) * k[START, i] + share * k[END, i])
 
 
 @kernel
 def predict_cage(bearing, scratch, h, y, k, end):
-    """Predict the cage at the end of a step of ``h`` [s]: x_1 and v*."""
-    speed = state.ROLLER_STATES * roller_count(bearing) + state.CAGE_VX
-    duration = h * share_at_end(bearing, scratch, AT_START, h)
-    dx, dy = stopped(bearing, scratch, AT_START, duration, h * k[START, speed], h * k[START, speed + 1])
-    x, y_, vx, vy = cage_of(bearing, y)
-    keep_cage(bearing, x + h * (vx + 0.5 * dx), y_ + h * (vy + 0.5 * dy), vx + dx, vy + dy, end)
+    """Predict cage and ring at the end of a step of ``h`` [s], and keep that state for ``correct_cage``."""
+    cage, ring = state.ROLLER_STATES * roller_count(bearing), partner_of(bearing.guide, bearing)
+    speed, other = cage + state.CAGE_VX, ring.speed
+    x, y_ = h * k[START, speed], h * k[START, speed + 1]
+    if other >= 0:
+        x, y_ = x - h * k[START, other], y_ - h * k[START, other + 1]
+    impulse = film_impulse(bearing, scratch, AT_START, h * share_at_end(bearing, scratch, AT_START, h), x, y_)
+    predict_body(cage + state.CAGE_X, speed, -1.0 / bearing.cage.mass, h, impulse, y, k, end)
+    if other >= 0:
+        predict_body(ring.place, other, ring.per_mass, h, impulse, y, k, end)
+    for i in range(end.size):
+        k[PREDICTED, i] = end[i]
 
 
 @kernel
-def correct_cage(bearing, scratch, h, y, k, predicted, end):
-    """Correct the speeds of a ``predicted`` cage, and its rates at the end of the step of ``h`` [s]."""
-    speed = state.ROLLER_STATES * roller_count(bearing) + state.CAGE_VX
-    x, y_, vx, vy = predicted
-    share = share_at_end(bearing, scratch, LATEST, h)
-    missing_x = y[speed] - vx + h * ((1.0 - share) * k[START, speed] + share * k[END, speed])
-    missing_y = y[speed + 1] - vy + h * ((1.0 - share) * k[START, speed + 1] + share * k[END, speed + 1])
-    dx, dy = stopped(bearing, scratch, LATEST, share * h, missing_x, missing_y)
-    k[END, speed] += (dx - missing_x) / (share * h)
-    k[END, speed + 1] += (dy - missing_y) / (share * h)
-    keep_cage(bearing, x, y_, vx + dx, vy + dy, end)
+def correct_cage(bearing, scratch, h, y, k, end):
+    """Correct cage and ring at the end of a step of ``h`` [s], from the rates there with the predicted speeds."""
+    cage, ring = state.ROLLER_STATES * roller_count(bearing), partner_of(bearing.guide, bearing)
+    speed, other, share = cage + state.CAGE_VX, ring.speed, share_at_end(bearing, scratch, LATEST, h)
+    x, y_ = missing(speed, share, h, y, k), missing(speed + 1, share, h, y, k)
+    if other >= 0:
+        x, y_ = x - missing(other, share, h, y, k), y_ - missing(other + 1, share, h, y, k)
+    impulse = film_impulse(bearing, scratch, LATEST, share * h, x, y_)
+    correct_body(cage + state.CAGE_X, speed, -1.0 / bearing.cage.mass, share, h, impulse, y, k, end)
+    if other >= 0:
+        correct_body(ring.place, other, ring.per_mass, share, h, impulse, y, k, end)

@@ -45,7 +45,6 @@ from rbdyn.dynamics.integrators.advance import BEFORE, DERIVATIVES, EIGENVALUES,
 from rbdyn.dynamics.integrators.stopped_cage import (
     AT_START,
     STIFF,
-    cage_of,
     correct_cage,
     keep_resistance,
     predict_cage,
@@ -196,12 +195,11 @@ def predict(bearing, film_stops, scratch, h, before, y, k, end):
 def correct(bearing, film_stops, scratch, h, before, y, k, end):
     """State at the end of the step, and the errors."""
     z, n = roller_count(bearing), y.size
-    predicted = cage_of(bearing, end)
     for i in range(2 * z, n):
         end[i] = y[i] + 0.5 * h * (k[START, i] + k[END, i])
     move_bodies(bearing, h, y, k, end)
     if film_stops:
-        correct_cage(bearing, scratch, h, y, k, predicted, end)
+        correct_cage(bearing, scratch, h, y, k, end)
     # After a step cut short the difference before it would be round-off.
     change = h * h / (6.0 * (h + before))
     change_before = change * min(h / before, GROW)
