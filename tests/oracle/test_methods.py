@@ -141,7 +141,7 @@ def test_unit_failures_stay_in_the_table(smooth, smooth_end, stretches, known):
     assert curve([bad, good], bad.method, 0.0) == [(good.position_error_m, good.turn_ms)]
     assert curve([bad, good], bad.method, 1.0) == []
     told = " ".join(comparison.conclusion([bad, good], {}, 1e-12, 0.25))
-    assert "RK4, fixed step at 1" in told
+    assert "Settings that failed: 1 of RK4, fixed step." in told
 
 
 def test_unit_fixed_step_stops_where_it_ceases_to_be_finite(stretches):
