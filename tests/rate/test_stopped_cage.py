@@ -33,7 +33,7 @@ def test_oracle_resistance_of_the_film(angle, share, course, speed):
     def at_velocity(vx, vy):
         return film_wrench(FILM, ex, ey, e, vx, vy, 300.0, 0.0)
 
-    found = at_velocity(vx, vy)
+    found = at_velocity(vx, vy).resistance
     along_x, along_y = (
         np.array([(b.x - a.x) / (2.0 * small), (b.y - a.y) / (2.0 * small)])
         for a, b in (
@@ -41,10 +41,10 @@ def test_oracle_resistance_of_the_film(angle, share, course, speed):
             (at_velocity(vx, vy - small), at_velocity(vx, vy + small)),
         )
     )
-    size = found.resist_xx + found.resist_yy
-    assert -along_x == pytest.approx([found.resist_xx, found.resist_xy], abs=1e-3 * size)
-    assert -along_y == pytest.approx([found.resist_xy, found.resist_yy], abs=1e-3 * size)
-    assert found.resist_xx * found.resist_yy > found.resist_xy**2
+    size = found.xx + found.yy
+    assert -along_x == pytest.approx([found.xx, found.xy], abs=1e-3 * size)
+    assert -along_y == pytest.approx([found.xy, found.yy], abs=1e-3 * size)
+    assert found.xx * found.yy > found.xy**2
 
 
 SUPPORT = ("support.outer_ring_mass_kg=0.4", "support.stiffness_N_m=5e7", "support.damping_N_s_m=2e3")

@@ -317,11 +317,19 @@ class InnerGuide(NamedTuple):
     dry: Any
 
 
-class JournalWrench(NamedTuple):
-    """Force on the journal [N], moments on journal and bearing [N m], dry load [N], powers lost [W], and ``resist_*`` of the film.
+class Resistance(NamedTuple):
+    """By how much the force of a film falls per speed [N s/m]; by ``xy`` that along x per speed along y, and that along y per speed along x."""
 
-    By ``resist_xy`` the force of the film along x falls per speed along y, and that along y per speed along x [N s/m].
-    """
+    xx: float
+    xy: float
+    yy: float
+
+
+NO_RESISTANCE = Resistance(0.0, 0.0, 0.0)
+
+
+class JournalWrench(NamedTuple):
+    """Force on the journal [N], moments on journal and bearing [N m], dry load [N], powers lost [W], resistance of the film."""
 
     x: float
     y: float
@@ -331,13 +339,11 @@ class JournalWrench(NamedTuple):
     film: float
     friction: float
     damping: float
-    resist_xx: float
-    resist_xy: float
-    resist_yy: float
+    resistance: Resistance
 
 
 class LandForces(NamedTuple):
-    """Forces [N] and moments [N m] on cage, inner and outer ring, dry load [N], powers lost [W], ``resist_*`` as in ``JournalWrench``."""
+    """Forces [N] and moments [N m] on cage, inner and outer ring, dry load [N], powers lost [W], resistance of the film."""
 
     cage_x: float
     cage_y: float
@@ -352,9 +358,7 @@ class LandForces(NamedTuple):
     film: float
     friction: float
     damping: float
-    resist_xx: float
-    resist_xy: float
-    resist_yy: float
+    resistance: Resistance
 
 
 @law_of(NoFilm)
@@ -363,7 +367,7 @@ def film_wrench(film, ex, ey, e, evx, evy, journal_speed, bearing_speed):
 
     ``ex, ey, e``: direction and size [m] of the journal's offset; ``evx, evy``: its velocity [m/s].
     """
-    return JournalWrench(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    return JournalWrench(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, NO_RESISTANCE)
 
 
 @film_wrench.body(ShortJournalFilm, StoppingFilm)
@@ -392,9 +396,11 @@ def _(film, ex, ey, e, evx, evy, journal_speed, bearing_speed):
         power,
         0.0,
         0.0,
-        ex * ex * resist_rr - both + ey * ey * resist_tt,
-        ex * ey * (resist_rr - resist_tt) + (ex * ex - ey * ey) * resist_rt,
-        ey * ey * resist_rr + both + ex * ex * resist_tt,
+        Resistance(
+            ex * ex * resist_rr - both + ey * ey * resist_tt,
+            ex * ey * (resist_rr - resist_tt) + (ex * ex - ey * ey) * resist_rt,
+            ey * ey * resist_rr + both + ex * ex * resist_tt,
+        ),
     )
 
 
@@ -412,14 +418,14 @@ def _(film):
 @law_of(NoContact)
 def dry_wrench(dry, radius, ex, ey, e, evx, evy, journal_speed, bearing_speed):
     """``JournalWrench`` of the contact, without a film."""
-    return JournalWrench(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    return JournalWrench(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, NO_RESISTANCE)
 
 
 @dry_wrench.body(DryContact)
 def _(dry, radius, ex, ey, e, evx, evy, journal_speed, bearing_speed):
     approach = e - dry.play
     if approach <= 0.0:
-        return JournalWrench(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+        return JournalWrench(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, NO_RESISTANCE)
     approach_rate = evx * ex + evy * ey
     elastic, stiffness = whole_load(dry.contact, approach)
     root = root_stiffness(dry.contact, stiffness, approach)
@@ -435,9 +441,7 @@ def _(dry, radius, ex, ey, e, evx, evy, journal_speed, bearing_speed):
         0.0,
         friction * slip,
         (load - elastic) * approach_rate,
-        0.0,
-        0.0,
-        0.0,
+        NO_RESISTANCE,
     )
 
 
@@ -458,19 +462,14 @@ def journal_wrench(guide, dx, dy, dvx, dvy, journal_speed, bearing_speed):
         film.film,
         dry.friction,
         dry.damping,
-        film.resist_xx,
-        film.resist_xy,
-        film.resist_yy,
+        film.resistance,
     )
 
 
 @law_of(NoGuide)
 def guide_forces(guide, cage, inner, outer):
     """Land forces, from the motions (``RingMotion``) of cage, inner and outer ring."""
-    return LandForces(
-        0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0,
-        0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0,
-    )  # fmt: skip
+    return LandForces(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, NO_RESISTANCE)
 
 
 @guide_forces.body(OuterGuide)
@@ -479,7 +478,7 @@ def _(guide, cage, inner, outer):
     on = journal_wrench(guide, dx, dy, dvx, dvy, cage.speed, outer.speed)
     return LandForces(
         on.x, on.y, on.journal_moment, 0.0, 0.0, 0.0, -on.x, -on.y, on.bearing_moment,
-        on.load, on.film, on.friction, on.damping, on.resist_xx, on.resist_xy, on.resist_yy,
+        on.load, on.film, on.friction, on.damping, on.resistance,
     )  # fmt: skip
 
 
@@ -489,7 +488,7 @@ def _(guide, cage, inner, outer):
     on = journal_wrench(guide, dx, dy, dvx, dvy, inner.speed, cage.speed)
     return LandForces(
         -on.x, -on.y, on.bearing_moment, on.x, on.y, on.journal_moment, 0.0, 0.0, 0.0,
-        on.load, on.film, on.friction, on.damping, on.resist_xx, on.resist_xy, on.resist_yy,
+        on.load, on.film, on.friction, on.damping, on.resistance,
     )  # fmt: skip
 
 

@@ -272,8 +272,8 @@ def derivative(bearing, y, row, dy, power, loads, scratch):
     # Two long chains of roots and quotients, which take little more time together than one.
     land = guide_forces(bearing.guide, cage, inner, outer)
     if has_stopping_film(bearing.guide):
-        resist = scratch.resistance
-        resist[0, 0], resist[0, 1], resist[0, 2] = land.resist_xx, land.resist_xy, land.resist_yy
+        for i in range(3):
+            scratch.resistance[0, i] = land.resistance[i]
     pockets = pocket_forces(bearing, cage, touching, y, row, dy, scratch)
     on_outer, on_inner = race_forces(bearing.outer, bearing.inner, bearing.sizes, outer, inner, z, y, row, dy, scratch)
     on_inner = with_open_films(bearing.open_film, on_inner, bearing.inner, bearing.sizes, inner, z, y, row, dy, scratch)

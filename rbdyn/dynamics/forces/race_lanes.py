@@ -80,7 +80,7 @@ class Scratch(NamedTuple):
     roller: NDArray[np.int64]  # (LANES,) number of each packed roller
     gap: NDArray[np.float64]  # (rollers,) gap of each in its pocket [m], or less its contact load there [N]
     touching: NDArray[np.int64]  # (rollers,) numbers of those that touch theirs
-    # (2, 3) of a ``StoppingFilm``: xx, xy and yy of ``LandForces`` [N s/m], latest and at the start of a step
+    # (2, 3) of a ``StoppingFilm``: ``Resistance`` [N s/m], latest and at the start of a step
     resistance: NDArray[np.float64]
 
 

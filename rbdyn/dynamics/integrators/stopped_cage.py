@@ -27,8 +27,9 @@ from rbdyn.dynamics.forces.equations import roller_count
 STIFF = 0.25
 # Rows of ``Scratch.resistance``: at the latest right-hand side, and at the start of the step.
 LATEST, AT_START = range(2)
-# Rows of ``Carry.k``, as in ``verlet``, and a free one for the predicted state.
-START, END, PREDICTED = 0, 1, 4
+# Rows of ``Carry.k`` in ``verlet``: rates at the start and at the end of the step and at the start of the step before, the errors,
+# and the predicted state, until the row is needed for squares.
+START, END, PAST, ERROR, PREDICTED = range(5)
 
 
 class Partner(NamedTuple):

@@ -44,6 +44,11 @@ from rbdyn.dynamics.integrators import advance as laws
 from rbdyn.dynamics.integrators.advance import BEFORE, DERIVATIVES, EIGENVALUES, GROW, LIMITED, STEP, TESTED
 from rbdyn.dynamics.integrators.stopped_cage import (
     AT_START,
+    END,
+    ERROR,
+    PAST,
+    PREDICTED,
+    START,
     STIFF,
     correct_cage,
     keep_resistance,
@@ -51,8 +56,6 @@ from rbdyn.dynamics.integrators.stopped_cage import (
     stop_in_step,
 )
 
-# Rows of ``Carry.k``: rates at the start and at the end of the step and at the start of the step before, then the errors.
-START, END, PAST, ERROR = range(4)
 # Largest ratio of a step to the one before in predicted speeds: behind a step cut short the change of the rates is round-off.
 LONGEST_RATIO = 2.0
 # Second over first change of the rates, at most: of a vibration it is h omega, and 2 of motions at the limit of their stability,
@@ -69,7 +72,7 @@ class Verlet(NamedTuple):
 
     speeds: int
     last: int = 1
-    free: int = 4
+    free: int = PREDICTED
     exponent: float = 0.7 / 3
     beta: float = 0.4 / 3
     rejected: float = 1 / 3
