@@ -34,6 +34,7 @@ from doe.adaptive.emulators import (
     levels_of,
     shares_of,
 )
+from doe.designs.optimal import Remaining
 from doe.pareto.front import Samples, SimulatedFront
 from doe.pareto.search import (
     NAMES,
@@ -177,7 +178,8 @@ class AdaptiveSearch:
 
     ``centre`` and ``step`` (k,) turn coded units into those of the factors, which ``evaluate`` and the ``baseline`` have.
     ``runs`` are those of the design at first, then all so far, failed ones too; ``residuals`` are those of every batch to its
-    predictions. The region may grow as far as the ``border``, not at all without one.
+    predictions. The region may grow as far as the ``border``, not at all without one. ``lost`` (l, k): points to stay away
+    from as from failed runs.
     """
 
     evaluate: Evaluate
@@ -190,6 +192,7 @@ class AdaptiveSearch:
     baseline: Array
     watch: Watch = lambda state, runs, budget: None
     border: Border | None = None
+    lost: Array | None = None
     history: list[Batch] = field(default_factory=list)
     fronts: list[Array] = field(default_factory=list)
     why: list[str] = field(default_factory=list)
@@ -222,7 +225,7 @@ class AdaptiveSearch:
             started = time.perf_counter()
             emulators = self._fit(self.runs)
             random = np.random.default_rng([self.plan.seed, len(self.history)])
-            pool = candidates(emulators, self.region, random, self.runs.points)
+            pool = self._candidates(emulators, self.runs, self.runs.points, random)
             levels, improvable, state = self._state(emulators, pool, random)
             count = min(self.plan.batch, room - len(self.runs.points))
             rows, _ = batch(emulators, pool, levels, improvable, count, self.region.apart)
@@ -245,6 +248,20 @@ class AdaptiveSearch:
                 if as_predicted(emulators, fresh):
                     return "batches gained nothing more and fresh runs on the front were as predicted"
                 since = len(self.history) - 1
+
+    def _candidates(
+        self, emulators: Emulators, runs: Runs, avoid: Array, random: np.random.Generator, rounds: int = 1
+    ) -> Array:
+        """Candidates (n, k) that are no twins of ``avoid`` (a, k) and lie nearer to a good run than to a failed or a lost one.
+
+        If none is as near, those farther off.
+        """
+        failed = runs.points[~runs.good]
+        points = candidates(emulators, self.region, random, np.vstack([failed, avoid]), rounds)
+        if self.lost is not None:
+            failed = np.vstack([self.lost, failed])
+        remain = Remaining(runs.points[runs.good], failed).excess(points) < 0.0
+        return points[remain] if remain.any() else points
 
     def _fit(self, runs: Runs) -> Emulators:
         good = int(runs.good.sum())
@@ -323,8 +340,9 @@ class AdaptiveSearch:
         if not finals.runs.good.any():
             raise MethodError("every run at the finalists failed; see the failures of the runs")
         started = time.perf_counter()
-        emulators = self._tested(self._fit(self.runs.plus(finals.runs)))
-        points = candidates(emulators, self.region, random, self.runs.points[~self.runs.good], ROUNDS)
+        runs = self.runs.plus(finals.runs)
+        emulators = self._tested(self._fit(runs))
+        points = self._candidates(emulators, runs, runs.points[~runs.good], random, ROUNDS)
         rows, costs = front_rows(emulators, points)
         archive, self.fronts[-1] = points[rows], points[rows[spread(costs[rows], SHOWN)]]
         predictions, deviations = emulators.predict(archive)
@@ -363,7 +381,7 @@ class AdaptiveSearch:
         for size in sizes.astype(int).tolist():
             started = time.perf_counter()
             emulators = self._fit(self.runs.plus(runs))
-            finalists = self._finalists(emulators, runs.points, size, random)
+            finalists = self._finalists(emulators, runs, size, random)
             self.seconds += time.perf_counter() - started
             points = finalists if predictions else np.vstack([finalists, original])
             more = self._run(points, np.full(len(points), self.plan.usual))
@@ -381,11 +399,10 @@ class AdaptiveSearch:
         last = np.vstack([np.ones((1, len(emulators.stretch))), *self.residuals[-TESTED:]])
         return replace(emulators, stretch=emulators.stretch * np.sqrt((last**2).mean(axis=0)).clip(1.0))
 
-    def _finalists(self, emulators: Emulators, before: Array, count: int, random: np.random.Generator) -> Array:
-        """Points of the predicted front that are expected to gain most next to those ``before`` (f, k)."""
-        points = candidates(
-            emulators, self.region, random, np.vstack([self.runs.points[~self.runs.good], before]), ROUNDS
-        )
+    def _finalists(self, emulators: Emulators, finals: Runs, count: int, random: np.random.Generator) -> Array:
+        """Points of the predicted front that are expected to gain most next to the runs at ``finals`` before."""
+        before = finals.points
+        points = self._candidates(emulators, self.runs.plus(finals), before, random, ROUNDS)
         if len(points):
             self._check_limits(emulators, points)
         rows, costs = front_rows(emulators, np.vstack([points, before]))

@@ -124,11 +124,12 @@ def find_adaptive(study: Problem, runs: Runs, simulations: Simulations) -> Adapt
     plan, goals, start_s = plan_of(study), study.goals, time.perf_counter()
     first_runs = _design_runs(study, runs)
     evaluator = Evaluator(study, simulations, plan.budget - len(first_runs.points))
-    region, step, border = region_in_units(study), study.half_ranges, border_of(study)
+    centre, region, step, border = study.centre, region_in_units(study), study.half_ranges, border_of(study)
+    lost = None if study.remaining is None else study.remaining.failed / study.reach
     with named_faults(study, lambda point: point, ""):
         try:
             search = AdaptiveSearch(
-                evaluator, study.centre, step, region, first_runs, goals, plan, study.baseline, evaluator.report, border
+                evaluator, centre, step, region, first_runs, goals, plan, study.baseline, evaluator.report, border, lost
             ).front()
         except InfeasibleError:
             raise
@@ -138,7 +139,7 @@ def find_adaptive(study: Problem, runs: Runs, simulations: Simulations) -> Adapt
                 raise RunError(f"adaptive front: {error} ({causes})") from None
             raise InputError(f"{study.path}: adaptive.{error}") from None
     ends = np.column_stack([search.region.low, search.region.high])
-    edges = study.centre[:, None] + step[:, None] * ends
+    edges = centre[:, None] + step[:, None] * ends
     front = replace(search.front, searched=_samples_about_finalists(study, search))
     return Adaptive(search, front, edges, tuple(evaluator.failures), time.perf_counter() - start_s)
 

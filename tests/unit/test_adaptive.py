@@ -134,6 +134,44 @@ def test_three_batches_in_a_row_must_gain_nothing():
     assert not nothing_gained([idle, idle, idle], 0), "those before a failed check do not count"
 
 
+def failing_bowls(seed):
+    """The bowls, whose runs fail in a corner that holds an end of their front."""
+    run = noisy(bowls, seed, 0.01)
+
+    def evaluate(points, replicates):
+        values, errors, freedom = run(points, replicates)
+        return np.where(points.sum(axis=1, keepdims=True) > 0.4, np.nan, values), errors, freedom
+
+    return evaluate
+
+
+def searched(evaluate, seed, **more):
+    """A search of 60 runs, 16 of them first ones."""
+    zero, plan = np.zeros(2), Plan(60, seed=seed, least=1, most=1, usual=1)
+    design = first_runs(evaluate, 2, 16, seed)
+    return AdaptiveSearch(evaluate, zero, np.ones(2), box(2), design, TWO, plan, zero, **more)
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_a_search_stays_away_from_where_its_runs_fail(coarse, seed):
+    """Without that 11 to 14 of its 32 runs in batches failed, and 3 of the 11 at the finalists."""
+    search = searched(failing_bowls(seed), seed)
+    front = search.front().front
+    assert (~search.runs.good[16:]).sum() <= 4
+    assert len(front.points) == 11
+    assert front.points.sum(axis=1).max() > 0.3, "it goes as near as runs go well"
+
+
+def test_a_search_stays_away_from_points_that_were_lost_before_it(coarse):
+    lost = np.array([[0.25, 0.25]])
+    nearest = []
+    for more in ({"lost": lost}, {}):
+        search = searched(noisy(bowls, 1, 0.01), 1, **more)
+        points = np.vstack([search.front().front.points, search.runs.points[16:]])
+        nearest.append(np.linalg.norm(points - lost, axis=1).min())
+    assert nearest[0] > 2.0 * nearest[1]
+
+
 def test_fresh_runs_must_lie_where_they_were_predicted():
     found = emulators()
     points = np.random.default_rng(5).uniform(-0.5, 0.5, (8, 2))
