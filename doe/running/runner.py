@@ -141,6 +141,11 @@ class Stage:
         return self.work * (1.0 - self.past_runs / self.runs) if self.runs > self.past_runs else 0.0
 
     @property
+    def most_work_left(self) -> float:
+        """Work of the runs left if all are needed."""
+        return self.work * self.runs_left[1] / self.runs if self.runs else 0.0
+
+    @property
     def runs_left(self) -> tuple[int, int]:
         """Runs left, at least and at most."""
         ends = self.runs if self.fewest is None else self.fewest, max(self.runs, self.most or 0)
@@ -324,10 +329,13 @@ class AgendaKeeper:
     def _estimate(self, pace_s: float) -> None:
         """State the time of all that is left, where a unit of work takes so long [s]; a short time is not worth a sentence."""
         self._estimated = True
-        work_left = sum(stage.work_left for stage in self.agenda.stages[self.agenda.place :])
-        rest_s = pace_s * work_left + self._steps_s
+        stages = self.agenda.stages[self.agenda.place :]
+        rest_s, most_s = (
+            pace_s * sum(works) + self._steps_s
+            for works in ([stage.work_left for stage in stages], [stage.most_work_left for stage in stages])
+        )
         if self.notice is not None and rest_s >= NOTABLE_S:
-            self.notice(f"{self._why}{estimate(rest_s, self._shorter_by)}")
+            self.notice(f"{self._why}{estimate(rest_s, self._shorter_by, most_s)}")
 
     def finish(self, files: Sequence[str]) -> None:
         """Note that all files of the answer are written."""
@@ -508,13 +516,14 @@ def part_stores(folder: Path) -> list[Path]:
 
 
 def refuse_other_parts(folder: Path, question: str) -> None:
-    """Raises InputError where the folder has a part of another table or study than that of this digest."""
+    """Raises InputError where the folder has a part of another table or study, or by other code, than that of this digest."""
     for path in part_stores(folder):
         with Store(path, read_only=True) as store:
             questions = {agenda.question for agenda, _ in agendas_of(store)}
         if questions - {question}:
             raise InputError(
-                f"--out {folder}: {path.parent.name} is a part of another input; remove it or name another folder"
+                f"--out {folder}: {path.parent.name} is a part of another input, or another version of rbdyn made it; remove it "
+                "or name another folder"
             )
 
 

@@ -204,11 +204,17 @@ def range_ends(quantiles: Sequence[float]) -> str:
 Notice = Callable[[str], object] | None
 # A shorter time [s] needs no sentence; a time above LONG_S needs one that says how to make the plan smaller.
 NOTABLE_S, LONG_S = 5.0, 600.0
+# How many times longer a plan may be before that is stated.
+CLEARLY = 1.25
 
 
-def estimate(seconds: float, keys: Sequence[str]) -> str:
-    """'the rest takes about 12 min; reduce numerics.turns to shorten it': the time to come, with what shortens a long one."""
-    sentence = f"the rest takes about {duration(seconds)}"
+def estimate(seconds: float, keys: Sequence[str], most: float = 0.0) -> str:
+    """'the rest takes about 12 min; reduce numerics.turns to shorten it': the time to come, with what shortens a long one.
+
+    ``most``: the time [s] if every run that may follow is needed; it is stated where it is clearly longer.
+    """
+    longer = f", and up to {duration(most)} if more runs are needed" if most > CLEARLY * seconds else ""
+    sentence = f"the rest takes about {duration(seconds)}{longer}"
     return f"{sentence}; reduce {any_of(keys)} to shorten it" if keys and seconds >= LONG_S else sentence
 
 

@@ -218,8 +218,8 @@ def test_runs_beyond_the_plan_are_estimated_anew(tmp_path):
             points = [Point(name, name) for name in names[before:]]
             keeper.timed(engine, works)(points, Ledger(silent_ledger, silent_ledger, silent_ledger))
     assert said == [
-        "2 to 8 runs, 1 at once", "the rest takes about 30 s",
-        "input sets: 6 runs in all; the rest takes about 90 s",
+        "2 to 8 runs, 1 at once", "the rest takes about 30 s, and up to 3.5 min if more runs are needed",
+        "input sets: 6 runs in all; the rest takes about 90 s, and up to 2.5 min if more runs are needed",
     ]  # fmt: skip
 
 

@@ -93,7 +93,9 @@ def test_a_part_of_another_table_is_refused(folder, monkeypatch):
     assert doe("run", rows, "--scene", "base.toml", "--out", "out", "--part", "1/2").returncode == 0
     refused = doe("run", others, "--scene", "base.toml", "--out", "out", "--part", "2/2")
     assert refused.returncode == 2
-    assert refused.stderr == "--out out: part-1-of-2 is a part of another input; remove it or name another folder\n"
+    assert refused.stderr == (
+        "--out out: part-1-of-2 is a part of another input, or another version of rbdyn made it; remove it or name another folder\n"
+    )
     for part, words in {"5/4": "a part from 1 to 4", "0/4": "a part from 1 to 4", "x": "K/N"}.items():
         refused = doe("run", rows, "--scene", "base.toml", "--out", "out", "--part", part)
         assert refused.returncode == 2 and f"--part {part}: this part does not exist; write {words}" in refused.stderr
