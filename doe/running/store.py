@@ -368,18 +368,16 @@ class Store(Database):
             update = f"ON CONFLICT (key) DO UPDATE SET {replaced} WHERE runs.status = 'claimed'"
             connection.execute(f"{insert} {update}", (key, self._study, *facts.values()))
 
-    def adopt(self, path: Path) -> int:
-        """Copy ended runs from the store at ``path`` that this one lacks; their number. Raises as ``Store``."""
+    def adopt(self, path: Path) -> None:
+        """Copy ended runs from the store at ``path`` that this one lacks. Raises as ``Store``."""
         with Store(path, read_only=True) as other, other._faults():
             columns = (
                 "key, status, result, digest, cause, study, label, run, factors, started, ended, seconds, host, pid"
             )
             rows = other._connection.execute(f"SELECT {columns} FROM runs WHERE status != 'claimed'")
             with self._transaction(durable=True) as connection:
-                before = connection.total_changes
                 marks = ", ".join("?" * len(columns.split(",")))
                 connection.executemany(f"INSERT OR IGNORE INTO runs ({columns}) VALUES ({marks})", rows)
-                return connection.total_changes - before
 
     def forget_failures(self, points: Sequence[Point]) -> None:
         """Delete failures of points from before this store was opened, so that they run again."""

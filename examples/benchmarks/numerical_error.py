@@ -31,7 +31,7 @@ from rbdyn.dynamics.ensemble import Outcome, Stop, run_all
 from rbdyn.dynamics.figures import BEARING
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.parameters.state import light_contact
-from rbdyn.dynamics.recording import run_one
+from rbdyn.dynamics.recording import recording_of
 from rbdyn.dynamics.run import prepare, with_numerics
 from rbdyn.dynamics.statistics.batch_means import student_factor
 from rbdyn.dynamics.statistics.metrics import (
@@ -141,7 +141,10 @@ def replicates(scene: Scene, count: int, plan: Companions | None, workers: int) 
     def ended(one: Outcome[Replicate]) -> None:
         runs[one.place] = one.result()
 
-    tasks = [partial(run_one, scene, bearing, index, plan, Stop()) for index in range(count)]
+    def run(index: int) -> Replicate:
+        return recording_of(scene, bearing, None, index, plan, Stop()).to(scene.numerics.turns)
+
+    tasks = [partial(run, index) for index in range(count)]
     run_all(tasks, workers, Stop(), ended)
     return [runs[place] for place in range(count)]
 

@@ -260,9 +260,10 @@ def slip_map(
     if load_angle or loss_factor:
         raise InputError("--load-angle, --loss-factor: belong to --stiffness; state that too, or leave them out")
     loaded = _rollers(scene, assignments, turns=turns, replicates=replicates, seed=seed)
+    from rbdyn.cli.simulation_output import map_duty
     from rbdyn.dynamics.slip_map import slip_map as run_map
 
-    marked = _map_duty(loaded, duty, columns, rows)
+    marked = None if duty is None else map_duty(loaded, duty, columns, rows)
     console.folder.claim(scene)
     points = console.folder.path / MAP_POINTS if console.folder.path else None
     with command.checkpoint_message(points), console.progress("mapping") as progress:
@@ -297,20 +298,6 @@ def _map_axes(speed: str | None, load: str | None, others: Sequence[str]) -> dic
 def _print_failed(mapped: "SlipMap") -> None:
     for point in mapped.failed:
         print(f"{point.place(mapped.axes)}: {point.status}", file=sys.stderr)
-
-
-def _map_duty(
-    scene: Scene,
-    path: Path | None,
-    speeds_rpm: Sequence[float],
-    loads_N: Sequence[float],  # noqa: N803
-) -> "MapDuty | None":
-    """The duty of a file on a map; None without a file. Raises InputError."""
-    if path is None:
-        return None
-    from rbdyn.cli.simulation_output import map_duty
-
-    return map_duty(scene, path, speeds_rpm, loads_N)
 
 
 def _rollers(path: Path, assignments: list[str] | None, **shorthand: float | None) -> Scene:

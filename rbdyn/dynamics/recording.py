@@ -230,18 +230,6 @@ def record(run: Run) -> Replicate:
     return Recording(run).to(run.scene.numerics.turns)
 
 
-def run_one(
-    scene: Scene,
-    bearing: RollerBearing,
-    replicate: int,
-    companions: Companions | None,
-    stop: Stop,
-    pace: Pace | None = None,
-) -> Replicate:
-    """Run a replicate, or a companion of it, from the start on. Raises RunError or CancelledError."""
-    return recording_of(scene, bearing, pace, replicate, companions, stop).to(scene.numerics.turns)
-
-
 def run_replicate(
     scene: Scene, bearing: RollerBearing, replicate: int, rtol: float, stop: Stop, pace: Pace | None = None
 ) -> Replicate:

@@ -26,7 +26,7 @@ from rbdyn.dynamics.figures import DAMAGE, PANELS
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.parameters.validity import heat_notes, limit_notes, status
 from rbdyn.dynamics.part_figures import part_figures
-from rbdyn.dynamics.recording import run_one
+from rbdyn.dynamics.recording import recording_of
 from rbdyn.dynamics.run import prepare
 from rbdyn.dynamics.simulate import steady_scene
 from rbdyn.dynamics.statistics.error_bars import after_transient, quantities
@@ -161,7 +161,8 @@ class Job(Record):
     def __call__(self) -> Replicate:
         """Make it. Raises RunError or CancelledError."""
         point = self.series
-        return run_one(point.scene, point.bearing, self.replicate, self.companions, point.stop, point.pace)
+        recording = recording_of(point.scene, point.bearing, point.pace, self.replicate, self.companions, point.stop)
+        return recording.to(point.scene.numerics.turns)
 
 
 class Series:

@@ -94,13 +94,13 @@ def counted(monkeypatch) -> list[float]:
     """Loads of the runs that a map begins from here on."""
     from rbdyn.dynamics import slip_map as module
 
-    ran, usual = [], module.run_one
+    ran, usual = [], module.recording_of
 
     def run(scene, *rest):
         ran.append(scene.operation.radial_load_N)
         return usual(scene, *rest)
 
-    monkeypatch.setattr(module, "run_one", run)
+    monkeypatch.setattr(module, "recording_of", run)
     return ran
 
 
