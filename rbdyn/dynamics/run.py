@@ -22,15 +22,7 @@ from rbdyn.dynamics.forces.race_samples import RaceSamples
 from rbdyn.dynamics.forces.state import CAGE_X, INNER_ANGLE, OUTER_ANGLE, RING_X, name
 from rbdyn.dynamics.integrators import advance
 from rbdyn.dynamics.integrators.runge_kutta import DormandPrince
-from rbdyn.dynamics.parameters.state import (
-    absolute_tolerance,
-    increments,
-    layout_of,
-    light_contact,
-    scales,
-    start_state,
-    wall_of,
-)
+from rbdyn.dynamics.parameters import state
 from rbdyn.dynamics.statistics.replicate import Replicate
 from rbdyn.scene import Scene
 
@@ -63,16 +55,16 @@ class Run:
         self.pace, self.spent_s = pace, 0.0
         self.ticket = 0 if pace is None else pace.enter()
         self.rtol, self.longest_step = rtol, longest_step
-        self.layout = layout_of(scene)
+        self.layout = state.layout_of(scene)
         seeds = np.random.SeedSequence(scene.numerics.seed, spawn_key=(replicate,))
         if begin is None:
-            begin = start_state(scene, bearing, np.random.default_rng(seeds), wall_of(scene, replicate))
+            begin = state.start_state(scene, bearing, np.random.default_rng(seeds), state.wall_of(scene, replicate))
         numerics = scene.numerics
         self.method: str = numerics.method
         self.explicit = explicit_method(scene)
         self.chosen = False
         first_method = self.explicit if self.method == "auto" else self.method
-        first_step = 1e-3 * scales(scene).length / scales(scene).speed
+        first_step = 1e-3 * state.scales(scene).length / state.scales(scene).speed
         self.carry = advance.carry_from(
             begin.copy(), bearing.rollers, first_step, method_of(first_method, scene, bearing)
         )
@@ -105,7 +97,7 @@ class Run:
         compared = self.method == "auto" and not elastic
         self.chosen, self.method = True, self.explicit
         stops = bool(has_stopping_film(bearing.guide))
-        slow = light_contact(scene) is not None and (stops or not elastic)
+        slow = state.light_contact(scene) is not None and (stops or not elastic)
         evened = slow and self.method == "verlet" and self.longest_step == math.inf
         if not (compared or evened):
             return
@@ -128,7 +120,7 @@ class Run:
         numerics = self.scene.numerics
         turns = numerics.turns + numerics.warm_up_turns
         return advance.Control(
-            1.0 / absolute_tolerance(self.scene, self.bearing, self.rtol, method),
+            1.0 / state.absolute_tolerance(self.scene, self.bearing, self.rtol, method),
             SMALLEST_STEP_TURNS * self.scene.turn_s,
             min(LARGEST_STEP_TURNS * self.scene.turn_s, self.longest_step),
             self._budget(turns),
@@ -260,7 +252,7 @@ def method_of(name: str, scene: Scene, bearing: RollerBearing) -> Any:
             )
         from rbdyn.dynamics.integrators.rosenbrock import rodas
 
-        return rodas(layout_of(scene), bearing, increments(scene, bearing))
+        return rodas(state.layout_of(scene), bearing, state.increments(scene, bearing))
     if name == "verlet":
         from rbdyn.dynamics.integrators.verlet import Verlet
 

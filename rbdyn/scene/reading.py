@@ -5,17 +5,7 @@ from copy import deepcopy
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self, TypeVar, cast
 
-from rbdyn.base.faults import (
-    LONGEST_NAME,
-    Consistent,
-    InputError,
-    Sparse,
-    one_line,
-    put_key,
-    read_toml,
-    set_key,
-    validated,
-)
+from rbdyn.base import faults
 from rbdyn.base.records import plain
 from rbdyn.base.words import html_table
 
@@ -25,7 +15,7 @@ T = TypeVar("T")
 if TYPE_CHECKING:
     from pydantic._internal._model_construction import ModelMetaclass
 else:
-    ModelMetaclass = type(Consistent)
+    ModelMetaclass = type(faults.Consistent)
 
 
 class Validation(ModelMetaclass):
@@ -34,8 +24,8 @@ class Validation(ModelMetaclass):
     def __call__(self, *arguments: Any, **tables: Any) -> Any:
         """The scene of these tables. Raises InputError with all faults at once."""
         if arguments:
-            raise InputError(
-                f"{self.__name__}({one_line(repr(arguments[0]), LONGEST_NAME)}): takes tables by keyword; "
+            raise faults.InputError(
+                f"{self.__name__}({faults.one_line(repr(arguments[0]), faults.LONGEST_NAME)}): takes tables by keyword; "
                 f"{self.__name__}.load reads a file, {self.__name__}.from_dict a dict"
             )
         return cast(type[SceneFile], self).from_dict(tables, self.__name__)
@@ -46,30 +36,30 @@ def _copied(value: T, source: str) -> T:
     try:
         return deepcopy(value)
     except (TypeError, RecursionError) as error:
-        raise InputError(
+        raise faults.InputError(
             f"{source}: holds a value that cannot be copied ({error}); give numbers, texts, lists and tables"
         ) from None
 
 
-class SceneFile(Consistent, Sparse, metaclass=Validation):
+class SceneFile(faults.Consistent, faults.Sparse, metaclass=Validation):
     """A scene from TOML. Equal scenes of equal seed and version give equal bits."""
 
     @classmethod
     def load(cls, path: Path | str, overrides: Iterable[str] = ()) -> Self:
         """Read a TOML scene, with ``key.path=value`` overrides. Raises InputError with all faults at once."""
-        return cls.from_dict(read_toml(path), str(path), overrides)
+        return cls.from_dict(faults.read_toml(path), str(path), overrides)
 
     @classmethod
     def from_dict(cls, data: dict[str, Any], source: str = "scene", overrides: Iterable[str] = ()) -> Self:
         """Validate nested tables in the form of TOML; messages name the ``source``. Raises InputError."""
         if not isinstance(data, Mapping):
-            name = one_line(repr(data), LONGEST_NAME)
-            raise InputError(f"{source} = {name}: must be a dict of tables; {cls.__name__}.load reads a file")
+            name = faults.one_line(repr(data), faults.LONGEST_NAME)
+            raise faults.InputError(f"{source} = {name}: must be a dict of tables; {cls.__name__}.load reads a file")
         assignments = _assignments(overrides)
         data = _copied(data, source)
         for assignment in assignments:
-            set_key(data, assignment)
-        scene = validated(cls._of_kind(data), data, source)
+            faults.set_key(data, assignment)
+        scene = faults.validated(cls._of_kind(data), data, source)
         scene.once("_stated", lambda: data)
         return scene
 
@@ -79,12 +69,12 @@ class SceneFile(Consistent, Sparse, metaclass=Validation):
         Defaults are computed anew, as for a file with these values. Raises InputError with all faults at once.
         """
         if not isinstance(changes, Mapping) or not all(isinstance(key, str) for key in changes):
-            raise InputError(
-                f'changes = {one_line(repr(changes), LONGEST_NAME)}: must be a dict such as {{"cage.mass_g": 50.0}}'
+            raise faults.InputError(
+                f'changes = {faults.one_line(repr(changes), faults.LONGEST_NAME)}: must be a dict such as {{"cage.mass_g": 50.0}}'
             )
         data = deepcopy(self._tables)
         for key, value in changes.items():
-            put_key(data, key, _copied(plain(value), f"changed {key!r}"), f"changed {key!r}")
+            faults.put_key(data, key, _copied(plain(value), f"changed {key!r}"), f"changed {key!r}")
         return self.from_dict(data, "changed scene")
 
     def overridden(self, overrides: Iterable[str]) -> Self:
@@ -136,8 +126,8 @@ def _assignments(overrides: Any) -> list[str]:
         assignments = list(overrides)
         if all(isinstance(assignment, str) for assignment in assignments):
             return assignments
-    name = one_line(repr(overrides), LONGEST_NAME)
-    raise InputError(f'overrides = {name}: must be a list such as ["cage.mass_g=50"]')
+    name = faults.one_line(repr(overrides), faults.LONGEST_NAME)
+    raise faults.InputError(f'overrides = {name}: must be a list such as ["cage.mass_g=50"]')
 
 
 def _leaves(table: Any, prefix: str = "") -> Iterator[str]:

@@ -17,16 +17,8 @@ from rbdyn.contact.hertz_line import ROLLERS, palmgren, pressure_notes
 from rbdyn.contact.rolling_resistance import THINNEST_LAYER, inlet
 from rbdyn.dynamics.forces.bodies import AIR_DENSITY
 from rbdyn.dynamics.parameters.model import film_of, oil_layer, race_contact_law, rolling_contacts
+from rbdyn.life import rollers
 from rbdyn.life.friction import STARVED, Running, starvation_factor
-from rbdyn.life.rollers import (
-    REFERENCE_SPEED,
-    ROLLER_GEOMETRY,
-    SERIES,
-    iso_15312_heat,
-    minimum_loads,
-    skf_moments,
-    static_capacity,
-)
 from rbdyn.properties.materials import SOFTEST_METAL, equivalent_modulus
 from rbdyn.result import FrictionCheck, RollerContact
 from rbdyn.scene import Scene
@@ -98,11 +90,13 @@ def friction_check(scene: Scene, power_loss: float) -> FrictionCheck | None:
     oil, load = scene.oil(), scene.operation.largest_load_N
     lengths = 1e-3 * sizes.bore, 1e-3 * sizes.outside
     running = Running(*lengths, inner - outer, oil.viscosity / oil.density, scene.lubricant.supply)
-    moments = skf_moments(named.series, running, load)
+    moments = rollers.skf_moments(named.series, running, load)
     power = sum(moments) * abs(inner - outer)
-    factor = starvation_factor(ROLLER_GEOMETRY, running)
+    factor = starvation_factor(rollers.ROLLER_GEOMETRY, running)
     ratio = power_loss / power if power > 0.0 and factor >= STARVED else None
-    return FrictionCheck(power, 1e3 * moments.rolling, 1e3 * moments.sliding, iso_15312_heat(sizes), ratio, factor)
+    return FrictionCheck(
+        power, 1e3 * moments.rolling, 1e3 * moments.sliding, rollers.iso_15312_heat(sizes), ratio, factor
+    )
 
 
 def friction_notes(check: FrictionCheck | None) -> Notes:
@@ -319,10 +313,10 @@ def light_load_notes(scene: Scene) -> Notes:
     if (listed := catalogue_entry(drawing)) is not None:
         named, box = listed
         diameter = 0.5e-3 * (box.bore + box.outside)
-        usual = REFERENCE_SPEED / diameter
-        of_series = SERIES[named.series].minimum_load, (box.reference_speed or usual / RPM) * RPM
-    capacities = drawing.rated_capacity, static_capacity(*drawing.rated_sizes)
-    rules = minimum_loads(diameter, inner - outer, *capacities, of_series)
+        usual = rollers.REFERENCE_SPEED / diameter
+        of_series = rollers.SERIES[named.series].minimum_load, (box.reference_speed or usual / RPM) * RPM
+    capacities = drawing.rated_capacity, rollers.static_capacity(*drawing.rated_sizes)
+    rules = rollers.minimum_loads(diameter, inner - outer, *capacities, of_series)
     load = operation.largest_load_N
     missed = sum(load < least for least in rules.values())
     if not missed:
