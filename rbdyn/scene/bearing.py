@@ -206,7 +206,10 @@ class Bearing(Consistent):
                     f"bearing.profile_table_mm_um: point ({x:g} mm, {drop:g} um) lies beyond the roller's end at {half:g} mm; "
                     "shorten the profile or lengthen bearing.roller_length_mm"
                 )
-        reach = max((abs(x) for x, _ in points), default=math.inf)
+            if drop < 0.0:
+                yield f"bearing.profile_table_mm_um: point ({x:g} mm, {drop:g} um) has a drop below 0; measure from the highest point"
+        first, last = (points[0][0], points[-1][0]) if points else (0.0, math.inf)
+        reach = last if first >= 0.0 else min(-first, last)
         if reach < 0.5 * self.effective_length_mm:
             yield (
                 f"bearing.profile_table_mm_um: ends at {reach:g} mm, within the contact of "

@@ -25,6 +25,14 @@ ADDED_FAULTS = {
         {**PROFILED, "bearing.profile_table_mm_um": [[0.0, 0.0], [1.0, 1.0]]},
         ("bearing.profile_table_mm_um: ends at 1 mm", "the contact of 1.75 mm", "extend the table"),
     ),
+    "whole profile short of one end of the contact": (
+        {**PROFILED, "bearing.profile_table_mm_um": [[-2.5, 5.0], [-1.0, 0.0]]},
+        ("bearing.profile_table_mm_um: ends at -1 mm", "the contact of 1.75 mm", "extend the table"),
+    ),
+    "profile that rises outward": (
+        {**PROFILED, "bearing.profile_table_mm_um": [[0.0, 0.0], [2.5, -5.0]]},
+        ("bearing.profile_table_mm_um: point (2.5 mm, -5 um)", "drop below 0", "measure from the highest point"),
+    ),
     "points that are not pairs": (
         {**PROFILED, "bearing.profile_table_mm_um": [[0.0, 0.0], [1.0, 1.0, 2.0]]},
         ("bearing.profile_table_mm_um", "each point is [position in mm, drop in um]"),
