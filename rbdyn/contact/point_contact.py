@@ -97,14 +97,9 @@ def point_contact(curvature_sum: float, curvature_difference: float, equivalent_
     """Contact of two bodies whose principal curvatures sum to ``curvature_sum`` [1/m].
 
     ``curvature_difference``: F = |r_I1 - r_I2 + r_II1 - r_II2| over that sum, for principal planes in common.
-    ``equivalent_modulus``: E' = 2/[(1-nu1^2)/E1 + (1-nu2^2)/E2] [Pa]. Raises ValueError for curvatures that touch in
-    no point (sum <= 0, or F outside [0, 1)) and for E' <= 0.
+    ``equivalent_modulus``: E' = 2/[(1-nu1^2)/E1 + (1-nu2^2)/E2] [Pa]. Curvatures that touch in a point have a sum
+    above 0 and F from 0 to below 1.
     """
-    if not curvature_sum > 0.0 or not 0.0 <= curvature_difference < 1.0:
-        what = f"curvature sum {curvature_sum:g}/m and difference {curvature_difference:g}"
-        raise ValueError(f"{what}: a point contact needs a sum above 0 and a difference from 0 to below 1")
-    if not equivalent_modulus > 0.0:
-        raise ValueError(f"equivalent modulus {equivalent_modulus:g} Pa must be positive")
     log_ellipticity, shape = _shape(curvature_difference)
     return _contact(curvature_sum, equivalent_modulus, math.exp(log_ellipticity), shape.first, shape.second)
 
@@ -123,13 +118,8 @@ def race_curvature(ball_diameter: float, groove_factor: float, gamma: float) -> 
     """Sum of curvatures [1/m] and F of a ball on a race.
 
     S = (4 - 1/f + 2 g/(1 - g))/D. ``groove_factor`` f is the groove radius over the ball diameter; ``gamma`` g = D cos(alpha)/d_m
-    is positive for the inner and negative for the outer race. Raises ValueError for a groove narrower than the ball, or
-    |gamma| >= 1.
+    is positive for the inner and negative for the outer race. f is above 0.5, |g| below 1.
     """
-    if not groove_factor > 0.5:
-        raise ValueError(f"groove factor {groove_factor:g} must be above 0.5; the ball jams in a closer groove")
-    if not -1.0 < gamma < 1.0:
-        raise ValueError(f"gamma = {gamma:g}: the ball must be smaller than the pitch circle")
     along, across = 2.0 * gamma / (1.0 - gamma), 1.0 / groove_factor
     total = 4.0 - across + along
     return total / ball_diameter, (across + along) / total

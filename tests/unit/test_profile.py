@@ -50,14 +50,6 @@ def test_unit_crown_is_a_circle(radius, share):
     assert drop == pytest.approx(x**2 / (2.0 * radius), rel=0.3 * (x / radius) ** 2 + 1e-15, abs=1e-300)
 
 
-def test_unit_crown_must_span_the_roller():
-    """Unit: a circle that does not reach the end of the roller is refused."""
-    assert profile.crowned_relief(np.array([5e-3]), 5e-3)[0] == pytest.approx(5e-3)
-    for radius in (4.9e-3, 0.0, -1.0, math.nan):
-        with pytest.raises(ValueError, match="crown"):
-            profile.crowned_relief(np.array([5e-3]), radius)
-
-
 def displacement(x, half_width, load):
     """Approach of two steel half-spaces on the centre line at x, under a strip of Hertz's pressure of length LENGTH.
 
@@ -94,8 +86,6 @@ def test_unit_lundberg_scales():
     once, twice = (profile.lundberg_relief(x, LENGTH, load, STEEL) for load in (1e3, 2e3))
     assert twice[1:4] == pytest.approx(2.0 * once[1:4], rel=1e-14)
     assert once[2] == 0.0 and math.isinf(once[0]) and math.isinf(once[4]) and once[1] == once[3]
-    with pytest.raises(ValueError, match="off the contact"):
-        profile.lundberg_relief(np.array([0.51 * LENGTH]), LENGTH, 1e3, STEEL)
 
 
 def test_unit_table_relief():
@@ -107,24 +97,6 @@ def test_unit_table_relief():
     assert profile.table_relief(x, lopsided) == pytest.approx([12e-6, 8e-6, 0.0, 1e-6, 3e-6, 6e-6], rel=1e-12)
     # A half that starts off the middle is level there.
     assert profile.table_relief(np.array([0.0]), ((1e-3, 2e-6), (6e-3, 9e-6)))[0] == 2e-6
-
-
-@pytest.mark.parametrize(
-    ("points", "message"),
-    [
-        (((0.0, 0.0),), "two points"),
-        (((0.0, 0.0, 1.0), (1.0, 1.0, 1.0)), "two points"),
-        (((0.0, 0.0), (0.0, 1e-6)), "rising"),
-        (((0.0, -1e-6), (6e-3, 1e-6)), "not negative"),
-        (((0.0, math.nan), (6e-3, 1e-6)), "finite"),
-        (((0.0, 0.0), (4e-3, 1e-6)), "short of the contact"),
-        (((-4e-3, 0.0), (6e-3, 1e-6)), "short of the contact"),
-    ],
-)
-def test_unit_bad_tables_are_refused(points, message):
-    """Unit: what is no profile of this roller is refused with the reason."""
-    with pytest.raises(ValueError, match=message):
-        profile.table_relief(np.array([-5e-3, 5e-3]), points)
 
 
 @given(share=st.floats(-0.999, 0.999), other=st.floats(-0.999, 0.999))

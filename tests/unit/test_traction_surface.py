@@ -185,11 +185,7 @@ def test_unit_light_rollers_are_driven_less():
 
 
 def test_unit_bad_tables_are_refused():
-    """Unit: loads out of order and coefficients that are not positive make no table."""
-    curve = curve_of(RHEOLOGY["eyring"])
-    for loads in ((10.0, 20.0), (10.0, 0.0), (math.inf, 1.0), (math.nan, 1.0)):
-        with pytest.raises(ValueError, match="must be positive and rise"):
-            traction_surface(curve, *loads, FASTEST)
+    """Unit: coefficients that are not positive make no table."""
     with pytest.raises(ValueError, match="positive and finite"):
         traction_surface(lambda u, q: 0.0 * u * q, LARGEST, SMALLEST, FASTEST)
 
