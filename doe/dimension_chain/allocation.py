@@ -14,10 +14,11 @@ tolerance is limited to the narrowest of its process.
 Source: Chase and Greenwood, Design issues in mechanical tolerance analysis (1988).
 """
 
+from bisect import bisect_left
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
-from math import exp, inf, sqrt
+from math import ceil, copysign, exp, inf, sqrt
 
 import numpy as np
 
@@ -32,6 +33,7 @@ SAMPLES = 100_000  # assemblies for a yield in a chain with functions
 HALVINGS = 26
 NEWTON_STEPS = 30
 WANDER = 0.5  # share of the nominal beyond which the steps of Newton have lost the solution
+LEAST_MOVES = 1000  # steps of a move of a nominal in a drawing without a resolution
 WIDEST = 64.0  # times the tolerances of the linear rule
 
 Tolerances = Mapping[str, float]
@@ -187,6 +189,26 @@ class Allocation(Record):
         if self.chain.allocate.grades:
             tolerances, grades = self._graded(tolerances)
         return self._classed(self._narrowed(tolerances, grades) or narrowest)
+
+    def moved(self) -> list[links.Part] | None:
+        """Stated parts with the least move of one nominal, in steps of the drawing, that keeps the limits; None where none does."""
+        stated, name = links.stated_parts(self.chain.link), self.adjusted.name
+        try:
+            (move,) = (part.moved_mm for part in self._adjusted_parts(stated) if part.name == name)
+        except MethodError:
+            return None
+        step = self.resolution or abs(move) / LEAST_MOVES
+
+        def at(count: int) -> list[links.Part]:
+            shift = copysign(count * step, move)
+            return [
+                links.at_nominal(part, round(part.nominal_mm + shift, links.DIGITS)) if part.name == name else part
+                for part in stated
+            ]
+
+        counts = range(1, ceil(abs(move) / step - links.SLACK) + 1) if move else range(0)
+        place = bisect_left(counts, True, key=lambda count: self.fits(at(count)))
+        return at(counts[place]) if place < len(counts) else None
 
     def _classed(self, parts: list[links.Part]) -> list[links.Part]:
         """The parts, allocated seats with the class of ISO 286 within their limits."""

@@ -63,9 +63,11 @@ def stated_reason(search: Allocation, parts: Sequence[Part], share: float, neare
     limits, mode, width = search.chain.closing_link, search.mode, search.chain.width_mm
     low, high = interval(search.function, parts, mode)
     free = {link.name for link in search.chain.free}
+    as_stated = {part.name: part.text for part in parts}
     kind = "RSS" if mode == "rss" else "worst-case"
     reached = f"{share:.4g} of {search.chain.allocate.target_yield:g}" if mode == "yield" else f"{share:.4g}"
-    sizes = ", ".join(f"{part.name} {part.text}" for part in nearest or () if part.name in free)
+    changed = [part for part in nearest or () if part.name in free and part.text != as_stated[part.name]]
+    sizes = ", ".join(f"{part.name} {part.text}" for part in changed)
     return (
         f"the given deviations put the closing link at {low:+.4f} to {high:+.4f} mm, outside {limits.lower_mm:.4f} to "
         f"{limits.upper_mm:.4f} mm; {kind} tolerance {high - low:.4f} of {width:.4f} mm, yield {reached}; "

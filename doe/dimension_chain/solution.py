@@ -322,10 +322,13 @@ def _verdict(search: Allocation, judged: _Judged, accepted: refusal.Judge) -> _V
     if judged.status is not None:
         return _Verdict(judged.status)
     chain, parts, share = search.chain, judged.parts, judged.share
-    # Sizes that a code states, such as those of bought rings, are no proposals.
-    nearest = search.allocated() if chain.is_stated and any(link.fit is None for link in chain.free) else None
-    if nearest is not None and not accepted(_with_sizes(chain, nearest))[0]:
-        nearest = None
+    # Sizes that a code states, such as those of bought rings, are no proposals. Where a move of one nominal is enough, the stated
+    # tolerances stay.
+    proposals = (
+        (search.moved, search.allocated) if chain.is_stated and any(link.fit is None for link in chain.free) else ()
+    )
+    found = (propose() for propose in proposals)
+    nearest = next((sizes for sizes in found if sizes and accepted(_with_sizes(chain, sizes))[0]), None)
     reason = (
         refusal.stated_reason(search, parts, share, nearest) if chain.is_stated else refusal.allocated_reason(search)
     )

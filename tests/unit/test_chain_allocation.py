@@ -131,6 +131,32 @@ def test_given_deviations_are_judged_by_the_yield():
     assert "the nearest that fits is a " in bad.status
 
 
+@pytest.mark.parametrize(
+    ("mode", "moved"),
+    # 1.000 +- 0.024 beside 0.993 to 1.043 in worst case, +- 0.012 sqrt(2) by root sum square: the least moves in steps of 0.001.
+    [("worst_case", 0.017), ("rss", 0.010)],
+)
+def test_stated_tolerances_that_fit_stay_and_one_nominal_moves_as_little_as_it_must(mode, moved):
+    links, limits = [(1, 9.0, 0.012, -0.012), (-1, 8.0, 0.012, -0.012)], (0.993, 1.043)
+    rule = {"mode": mode, "resolution_mm": 0.001}
+    result = solve(chain(links, limits, **rule), samples=1000)
+    assert result.refused
+    first, second = result.allocation
+    assert first.nominal_mm == pytest.approx(9.0 + moved) and first.moved_mm == pytest.approx(moved)
+    assert (first.upper_mm, first.lower_mm) == (0.012, -0.012)
+    assert (second.nominal_mm, second.upper_mm, second.lower_mm) == (8.0, 0.012, -0.012)
+    assert result.status.endswith(f"the nearest that fits is a {9.0 + moved:.3f} +0.012/-0.012")
+    again = solve(chain([(1, 9.0 + moved, 0.012, -0.012), links[1]], limits, **rule), samples=1000)
+    less = solve(chain([(1, 8.999 + moved, 0.012, -0.012), links[1]], limits, **rule), samples=1000)
+    assert again.status == "ok" and less.refused
+
+
+def test_tolerances_too_wide_for_any_nominal_are_allocated_anew():
+    links = [(1, 9.0, 0.03, -0.03), (-1, 8.0, 0.03, -0.03)]
+    result = solve(chain(links, (0.96, 1.04)), samples=1000)
+    assert result.refused and all(part.tolerance_mm < 0.06 for part in result.allocation)
+
+
 def test_slack_after_snapping_widens_the_finest_grade_that_still_fits():
     links, limits = [(1, 9.0), (-1, 8.0)], (0.9, 0.938)
     plain = by_name(solve(chain(links, limits, grades=True), samples=10))
