@@ -321,11 +321,16 @@ class Allocation(Record):
         return link.cost.b * (narrow**-link.cost.k - wide**-link.cost.k), -step
 
     def _missing(self, parts: list[links.Part]) -> float:
-        """Shift of the closing link to its target, mm."""
+        """Shift of the closing link to its target, mm.
+
+        Of a moved part with deviations on both sides that is the middle of the limits. One with a limit of size for its nominal
+        gets that from the upper limit: 9.29 0/-0.004.
+        """
         limits = self.chain.closing_link
-        if self.mode != "yield":
-            return limits.upper_mm - interval(self.function, parts, self.mode)[1]
         target = (limits.lower_mm + limits.upper_mm) / 2
+        if self.mode != "yield":
+            ends = interval(self.function, parts, self.mode)
+            return target - sum(ends) / 2 if self.adjusted.position in links.TWO_SIDED else limits.upper_mm - ends[1]
         if self.function.linear:
             return target - closing_moments(self.function, parts, None)[0]
         return target - sum(self.tails(parts)) / 2

@@ -40,6 +40,7 @@ DRAWING_DECIMALS = 3  # least decimals of a size in mm
 ESTIMATED = "\u2248"  # before a size that is an estimate
 
 
+TWO_SIDED = ("symmetric", "js", "JS")  # positions with as much on both sides of the nominal
 LEAST = 1e-6  # mm: tolerance that counts as one where nothing is rounded
 SHAFT_LETTERS = ("f", "g", "h", "js", "j", "k", "m", "n", "p", "r", "s")
 HOLE_LETTERS = ("F", "G", "H", "JS", "J", "K", "M", "N", "P", "R", "S")
@@ -380,7 +381,7 @@ def least_tolerance(link: Link, resolution: float) -> float:
     if not resolution:
         return max(process, LEAST)
     # Both sides of a symmetric tolerance are whole steps.
-    step = resolution * (2 if link.position in ("symmetric", "js", "JS") else 1)
+    step = resolution * (2 if link.position in TWO_SIDED else 1)
     return on_step(max(steps_above(process, step), 1), step)
 
 

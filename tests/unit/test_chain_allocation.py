@@ -157,6 +157,16 @@ def test_tolerances_too_wide_for_any_nominal_are_allocated_anew():
     assert result.refused and all(part.tolerance_mm < 0.06 for part in result.allocation)
 
 
+def test_symmetric_parts_keep_the_closing_link_in_the_middle_where_grades_leave_room():
+    """IT9 and IT10 take 0.194 of 0.2026 mm: the guide clearance that a study selected stays the mean, as many parts lie below as above."""
+    links = [(1, 70.333, {"position": "symmetric"}), (-1, 70.073, {"position": "symmetric"})]
+    rule = {"method": "iso286", "grades": True, "spend_slack": True, "adjust": "b", "resolution_mm": 0.001}
+    result = solve(chain(links, (0.18771, 0.39029), **rule), samples=1000)
+    assert [part.grade for part in result.allocation] == ["IT10", "IT9"]
+    assert result.allocation[1].nominal_mm == 70.044
+    assert result.nominal_mm == pytest.approx(0.289) and sum(result.worst_case_mm) / 2 == pytest.approx(0.289)
+
+
 def test_slack_after_snapping_widens_the_finest_grade_that_still_fits():
     links, limits = [(1, 9.0), (-1, 8.0)], (0.9, 0.938)
     plain = by_name(solve(chain(links, limits, grades=True), samples=10))
