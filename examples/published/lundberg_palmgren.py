@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from rbdyn.life.balls import ball_size_term, refuse_impossible
+from rbdyn.life.balls import ball_size_term
 from rbdyn.scene.ball import BallRow
 
 LUNDBERG_PALMGREN = 98.1  # [N, mm]
@@ -21,11 +21,10 @@ def lundberg_palmgren_capacities(
     """Ball load [N] that the inner and the outer race bear for 1e6 turns, from the dimensions [m, rad].
 
     98.1 (2f/(2f-1))^0.41 (1-+g)^1.39/(1+-g)^(1/3) (g/cos alpha)^0.3 D^1.8 Z^(-1/3) in N and mm, g = D cos(alpha)/d_m,
-    upper signs inside (Sensors 2023, eq 8). Raises ValueError unless 0 < g < 1 and both groove factors exceed 0.5.
+    upper signs inside (Sensors 2023, eq 8).
     """
     relative = ball_diameter / pitch_diameter
     gamma = relative * math.cos(contact_angle)
-    refuse_impossible(gamma, inner_groove_factor, outer_groove_factor)
 
     def capacity(groove: float, signed: float) -> float:
         shape = (1.0 - signed) ** 1.39 / (1.0 + signed) ** (1.0 / 3.0) * relative**0.3

@@ -192,10 +192,7 @@ def _relief(scene: Scene, race: str, angle: Array) -> Array:
 
 
 def roller_duty_life(scenes: Sequence[Scene], shares: Sequence[float]) -> DutyLife:
-    """Life over a duty from the scene at each point and its share of time; loads are the radial ones.
-
-    Raises MethodError for shares that do not sum to 1.
-    """
+    """Life over a duty from the scene at each point and its share of time; loads are the radial ones."""
     cases = [load_case(scene, share) for scene, share in zip(scenes, shares, strict=True)]
     return duty_life(cases, ROLLER_EXPONENT)
 

@@ -18,7 +18,6 @@ from collections.abc import Sequence
 from typing import Any, Literal
 
 from rbdyn.base.blocks import Sheet, columns_of
-from rbdyn.base.faults import MethodError
 from rbdyn.base.notes import Note, Notes
 from rbdyn.base.records import Record, finite, shown
 
@@ -158,15 +157,7 @@ def equivalent_load(cases: Sequence[LoadCase], exponent: float) -> float:
 
 
 def duty_life(cases: Sequence[LoadCase], exponent: float) -> DutyLife:
-    """Life over a duty by Palmgren and Miner, from the life at each point; ``exponent``: p of the equivalent load.
-
-    Raises MethodError for a duty without points, negative shares or loads, and shares whose sum is not 1.
-    """
-    shares = [case.share for case in cases]
-    if not cases or min(shares) < 0.0 or abs(sum(shares) - 1.0) > SHARE_ROUNDING:
-        raise MethodError(f"shares of time {shares}: must not be negative and must sum to 1")
-    if not all(0.0 <= case.load < math.inf for case in cases):
-        raise MethodError(f"loads {[case.load for case in cases]} N: must be finite and not negative")
+    """Life over a duty by Palmgren and Miner, from the life at each point; ``exponent``: p of the equivalent load."""
     rates = [case.share / case.hours for case in cases]
     rate = sum(rates)
     hours = 1.0 / rate if rate > 0.0 else math.inf

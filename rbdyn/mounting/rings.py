@@ -18,7 +18,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rbdyn.base.faults import MethodError
 from rbdyn.base.records import Record
 from rbdyn.properties.materials import Material
 
@@ -26,21 +25,13 @@ from rbdyn.properties.materials import Material
 class Ring(Record):
     """A ring, a solid (inner radius 0) or hollow shaft, or a housing.
 
-    Radii [m]; ``temperature_rise`` above the temperature of the drawing [K], uniform; ``speed`` [rad/s].
-    Raises MethodError unless 0 <= inner radius < outer radius.
-    """
+    Radii [m]; ``temperature_rise`` above the temperature of the drawing [K], uniform; ``speed`` [rad/s]."""
 
     inner_radius: float
     outer_radius: float
     material: Material
     temperature_rise: float = 0.0
     speed: float = 0.0
-
-    def __post_init__(self) -> None:
-        if not 0.0 <= self.inner_radius < self.outer_radius:
-            raise MethodError(
-                f"a ring from {self.inner_radius:g} to {self.outer_radius:g} m has no wall; fix its diameters"
-            )
 
     def heat_capacity(self, width: float) -> float:
         """Heat capacity of the ring over a width [m], [J/K]."""
@@ -85,14 +76,9 @@ class Ring(Record):
 def overlap(inner: Ring, outer: Ring, interference: float) -> Any:
     """Radial overlap of two rings before they press on each other, at their temperature and speed; negative is a gap [m].
 
-    ``interference``: diametral, at rest and at the temperature of the drawing [m], positive for a tight fit. Raises MethodError
-    where the rings do not share the nominal radius.
+    ``interference``: diametral, at rest and at the temperature of the drawing [m], positive for a tight fit. Both have
+    the nominal radius of the fit.
     """
-    if not math.isclose(inner.outer_radius, outer.inner_radius, rel_tol=1e-9):
-        raise MethodError(
-            f"radii of {inner.outer_radius:g} and {outer.inner_radius:g} m are not the two radii of one fit; give both "
-            "the nominal radius, and the difference as interference"
-        )
     radius = outer.inner_radius
     return 0.5 * interference + inner.growth(radius) - outer.growth(radius)
 

@@ -24,7 +24,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from rbdyn.base.arrays import Array, Mask
-from rbdyn.base.faults import RPM, MethodError
+from rbdyn.base.faults import RPM
 from rbdyn.base.records import finite
 from rbdyn.contact.point_contact import PointContact
 from rbdyn.life import balls
@@ -361,14 +361,8 @@ def load_torque(
 ) -> float:
     """Palmgren's torque of the load M1 = f1 P1 dm [N m], f1 = z (P0/C0)^y of angular contact ball bearings.
 
-    P1 = 0.9 Fa cot(alpha0) - 0.1 Fr, but not below Fr. Loads and capacity [N], angle [rad], diameter [m].
-    Raises MethodError unless angle and capacity are positive.
+    P1 = 0.9 Fa cot(alpha0) - 0.1 Fr, but not below Fr. Loads and capacity [N], angle > 0 [rad], diameter [m].
     """
-    if static_capacity <= 0.0 or contact_angle <= 0.0:
-        raise MethodError(
-            f"a static capacity of {static_capacity:g} N and a contact angle of {contact_angle:g} rad give no load torque; "
-            "both must be greater than 0"
-        )
     radial, axial = abs(radial_load), abs(axial_load)
     scale, exponent = ANGULAR_CONTACT
     rating = static_equivalent_load(radial, axial, contact_angle) / static_capacity

@@ -7,7 +7,7 @@ depend on size and flow. The residence time of the oil checks its order.
 
 import math
 
-from rbdyn.base.faults import RPM, MethodError
+from rbdyn.base.faults import RPM
 from rbdyn.base.notes import Note, Notes
 
 # X = SCALE W^FLOW_EXPONENT/(n d_m^DIAMETER_EXPONENT), W in cm^3/min, n in rpm, d_m in mm.
@@ -24,13 +24,8 @@ def oil_fraction(volume_flow: float, speed: float, pitch_diameter: float, factor
     """Volume of oil over volume of the oil-air mixture [-], at most 0.15; unverified.
 
     X = factor 1e5 W^0.37/(n d_m^1.7): ``volume_flow`` W [m^3/s], ``speed`` n of one ring against the other [rad/s],
-    ``pitch_diameter`` d_m [m]. Raises MethodError without flow, speed or size.
+    ``pitch_diameter`` d_m [m]; none of them is 0.
     """
-    if not (volume_flow > 0.0 and speed != 0.0 and pitch_diameter > 0.0):
-        raise MethodError(
-            f"oil flow {volume_flow:g} m3/s, speed {speed:g} rad/s and pitch diameter {pitch_diameter:g} m: the oil fraction "
-            "needs all three; state lubricant.oil_fraction instead"
-        )
     flow = volume_flow / CM3_PER_MINUTE
     share = SCALE * flow**FLOW_EXPONENT / (abs(speed) / RPM * (1e3 * pitch_diameter) ** DIAMETER_EXPONENT)
     return min(factor * share, LARGEST)

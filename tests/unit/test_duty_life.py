@@ -10,7 +10,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from test_life import static_loads as by_standard
 
-from rbdyn.base.faults import MethodError
 from rbdyn.contact.hertz_line import iso_16281
 from rbdyn.contact.profile import logarithmic_relief, slice_centres
 from rbdyn.dynamics.part_figures import roller_duty_life, static_life
@@ -90,15 +89,6 @@ def test_invariant_equivalent_load_has_the_life_of_the_duty(points):
     assert min(loads) * (1.0 - 1e-12) <= life.equivalent_load <= max(loads) * (1.0 + 1e-12)
     assert sum(life.damage) == pytest.approx(1.0)
     assert duty_life(cases[::-1], ROLLER_EXPONENT).hours == pytest.approx(life.hours, rel=1e-12)
-
-
-def test_unit_impossible_duties_are_refused():
-    """Unit: no points, shares that do not sum to 1 or are negative, and impossible loads."""
-    for cases in ([], [case(0.5, 1.0, 1.0)], [case(1.5, 1.0, 1.0), case(-0.5, 1.0, 1.0)]):
-        with pytest.raises(MethodError, match="must sum to 1"):
-            duty_life(cases, ROLLER_EXPONENT)
-    with pytest.raises(MethodError, match="not negative"):
-        duty_life([LoadCase(1.0, 1.0, math.inf, case(1.0, 1.0, 1.0).life)], ROLLER_EXPONENT)
 
 
 def contacts(length: float, relief: np.ndarray) -> RollerContacts:

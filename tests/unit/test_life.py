@@ -39,9 +39,6 @@ def test_literature_capacity_factor():
     table = {0.01: 52.1, 0.02: 60.8, 0.04: 70.7, 0.06: 76.9, 0.10: 84.2, 0.16: 88.5, 0.20: 88.7, 0.30: 83.8}
     for gamma, factor in table.items():
         assert life.capacity_factor(gamma) == pytest.approx(factor, abs=0.11)
-    for gamma in (0.0, 1.0, -0.1, math.nan):
-        with pytest.raises(ValueError, match="gamma"):
-            life.capacity_factor(gamma)
 
 
 def test_unit_dynamic_capacity_scales():
@@ -214,21 +211,3 @@ def test_unit_hours_and_no_load():
     assert result.hours(omega, omega) == math.inf
     idle = life.reference_life(0.0 * loads, 0.0 * loads, capacity=15e3, gamma=GAMMA)
     assert (idle.million_turns, idle.equivalent_load, idle.hours(omega)) == (math.inf, 0.0, math.inf)
-
-
-@pytest.mark.parametrize(
-    ("inner", "outer", "angle", "message"),
-    [
-        (np.ones((2, 5)), np.ones((2, 6)), None, "do not match"),
-        (np.ones(5), np.ones(5), None, "samples, rollers"),
-        (np.ones((0, 5)), np.ones((0, 5)), None, "samples, rollers"),
-        (-np.ones((2, 5)), np.ones((2, 5)), None, "inner loads hold"),
-        (np.ones((2, 5)), np.full((2, 5), math.nan), None, "outer loads hold"),
-        (np.ones((2, 5)), np.full((2, 5), math.inf), None, "outer loads hold"),
-        (np.ones((2, 5)), np.ones((2, 5)), np.zeros((2, 4)), "angles"),
-    ],
-)
-def test_unit_bad_loads_are_refused(inner, outer, angle, message):
-    """Unit: arrays that do not match, and loads that are none, are refused with the reason."""
-    with pytest.raises(ValueError, match=message):
-        life.reference_life(inner, outer, capacity=15e3, gamma=GAMMA, angle=angle)

@@ -157,10 +157,6 @@ def test_unit_fit_comes_loose():
     spun = interface_pressure(replace(shaft, speed=OMEGA), replace(ring, speed=OMEGA), 5e-6)
     assert 0.0 < spun < cold
     assert interface_pressure(shaft, replace(ring, temperature_rise=20.0), 5e-6) == 0.0
-    with pytest.raises(ValueError, match="one fit"):
-        interface_pressure(shaft, Ring(13.6e-3, 17.25e-3, STEEL), 5e-6)
-    with pytest.raises(ValueError, match="no wall"):
-        Ring(2e-3, 2e-3, STEEL)
 
 
 @pytest.mark.parametrize("ratio", [0.70, 0.75, 0.80, 0.85])

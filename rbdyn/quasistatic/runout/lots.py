@@ -55,15 +55,13 @@ class LinearResponse(NamedTuple):
 def linear_response(row: Row, control: Control, load: Array, constraint: Array | None = None) -> LinearResponse:
     """Response of a row of equal, evenly spaced balls under an axial load, by central differences.
 
-    Arguments are those of ``equilibrium.solve``. Raises MethodError for another load or unequal balls, and RunError with
+    Arguments are those of ``equilibrium.solve``. Raises MethodError for another load, and RunError with
     the cause where there is no equilibrium.
     """
     if np.any(np.delete(load, 2)):
         raise MethodError(
             "load: the linear response of runout needs a purely axial load; set the other components to 0"
         )
-    if any(np.ptp(getattr(row, name)) > 0.0 for name in CHANGES):
-        raise MethodError("row: its balls or raceways already have errors; give the nominal row")
     middle = _equilibrium(solve(row, control, load, constraint))
     slopes = []
     for name in CHANGES:
