@@ -209,16 +209,12 @@ def fit_emulator(
     which the search starts; without ``search`` they stay. ``prior``: mean and deviation of the logarithm of a length scale in
     half ranges, of one input alone.
 
-    Raises MethodError for numbers that are not finite, variances below 0 or fewer than two runs.
+    Raises MethodError for numbers that are not finite and variances below 0.
     """
     from doe.emulator.regression import Trended, mode, regression
 
     places, responses = np.asarray(points, float), np.asarray(values, float)
     noise = np.array(np.broadcast_to(np.asarray(variances, float), responses.shape))
-    if places.ndim != 2 or responses.shape != (len(places),) or len(places) < 2:
-        raise MethodError(
-            f"emulator: points {places.shape} and values {responses.shape}: give two runs at least, a value each"
-        )
     if not (all(np.isfinite(part).all() for part in (places, responses, noise)) and (noise >= 0.0).all()):
         raise MethodError(
             "emulator: a point, value or variance is not a finite number, or a variance is below 0; fix it"

@@ -18,7 +18,6 @@ import numpy as np
 from doe.pareto import manufacture
 from doe.pareto.search import NAMES, Goals, Rule, dominates, non_dominated, pick_all
 from rbdyn.base.arrays import Array, Mask, Rows
-from rbdyn.base.faults import MethodError
 from rbdyn.base.records import Record
 
 Costs = Callable[[Array], Array]
@@ -87,16 +86,7 @@ class Parts(Record, eq=False, kw_only=True):
 
         The search goes from the centre outwards up to the first loss, so all narrower tolerances keep the limits too. Where even
         the exact centre breaks a limit, all widths are zero.
-
-        Raises MethodError when a ratio is not positive, the probability is not in (0, 1), or the centre is outside the region.
         """
-        if (ratios <= 0.0).any() or not 0.0 < self.probability < 1.0:
-            raise MethodError(
-                f"ratios = {ratios.tolist()}, probability = {self.probability}: must be positive and in (0, 1)"
-            )
-        slack = 1e-9 * (self.upper - self.lower)
-        if ((self.centre < self.lower - slack) | (self.centre > self.upper + slack)).any():
-            raise MethodError(f"pick = {self.centre.tolist()}: is outside the region; choose a point within it")
         exact = np.zeros(self.centre.size)
         if self.share(exact) < self.probability:
             worst = self.most_broken(exact)

@@ -220,5 +220,3 @@ def test_only_a_fit_loads_scikit_learn():
 def test_it_refuses_what_is_no_number():
     with pytest.raises(ValueError, match="not a finite number"):
         fit_emulator(POINTS, np.full(30, np.nan), 0.1)
-    with pytest.raises(ValueError, match="give two runs"):
-        fit_emulator(POINTS, VALUES[:3], 0.1)

@@ -232,12 +232,3 @@ def test_uncertain_surfaces_leave_less():
         widest(lambda p, e=e: p[:, :1] + e, [0.0, 0.0], [1.0], [1.0, 1.0], names=["x"], **BOX) for e in (0.0, random)
     )
     assert 0.5 < unsure.half_widths[0] / sure.half_widths[0] < 0.95
-
-
-@pytest.mark.parametrize(
-    ("change", "words"), [({"ratios": [0.0, 1.0]}, "must be positive"), ({"pick": [11.0, 0.0]}, "outside the region")]
-)
-def test_widest_tolerances_refuse_what_makes_no_sense(change, words):
-    arguments = {"pick": [0.0, 0.0], "limits": [1.0], "ratios": [1.0, 1.0]} | change
-    with pytest.raises(ValueError, match=words):
-        widest(first_factor, names=["x"], **arguments, **BOX)
