@@ -289,14 +289,18 @@ def study(
 ) -> Report:
     """``rbdyn accuracy SCENE tolerances``: bias of the statistics against a ``margin``, and trajectories of the compiled methods.
 
-    Raises InputError, RunError where a reference fails, KeyboardInterrupt.
+    Where the reference of the trajectories fails, the statistics alone are compared. Raises InputError, RunError where theirs
+    fails, KeyboardInterrupt.
     """
     check_replicates(scene)
-    motion = methods.study(scene, progress, turns, COMPILED)
+    motion, why = None, ""
+    try:
+        motion = methods.study(scene, progress, turns, COMPILED)
+    except RunError as error:
+        why = f"Trajectories are not compared, because their reference failed: {str(error).rstrip('.')}."
     biases = statistics_bias(scene, rtols, progress)
     choice = conclusion(biases.rows, scene, margin)
     numerics, rows = scene.numerics, records(biases.rows)
-    agreement, trajectories, _ = motion.tables
     failures = {f"{rtol:g}": why for rtol, why in biases.failures.items()}
     content = record(
         "rbdyn.accuracy/1",
@@ -306,16 +310,22 @@ def study(
         conclusion=choice,
         turns=numerics.turns,
         replicates=numerics.replicates,
-        trajectory={key: motion.record[key] for key in MOTION},
+        trajectory=motion and {key: motion.record[key] for key in MOTION},
     )
-    sentences = *motion.sentences, choice, *(f"rtol {rtol} failed: {why}" for rtol, why in failures.items())
+    sentences = *(motion.sentences if motion else [why]), choice
+    sheets = {"accuracy": [flat(row) for row in rows]}
+    pictures: dict[str, Callable[[Any], None]] = {"accuracy": lambda path: _draw(biases.rows, path, margin)}
     return Report(
         "accuracy",
         content,
-        (agreement, trajectories, table(biases, margin)),
-        (*sentences, f"{numerics.replicates} replicates of {numerics.turns:g} turns"),
-        {"accuracy": [flat(row) for row in rows], "trajectory": motion.record["rows"]},
-        {"accuracy": lambda path: _draw(biases.rows, path, margin), "trajectory": motion.pictures["methods"]},
+        (*(motion.tables[:2] if motion else []), table(biases, margin)),
+        (
+            *sentences,
+            *(f"rtol {rtol} failed: {why}" for rtol, why in failures.items()),
+            f"{numerics.replicates} replicates of {numerics.turns:g} turns",
+        ),
+        sheets | ({"trajectory": motion.record["rows"]} if motion else {}),
+        pictures | ({"trajectory": motion.pictures["methods"]} if motion else {}),
     )
 
 
