@@ -81,6 +81,21 @@ def test_failed_points_are_left_out_told_and_not_tried_again_unless_asked(tmp_pa
     assert sorted(thawed) == [3, 18, 19] and not mended.failures and len(mended.coded) == 20
 
 
+def test_a_study_of_the_life_says_what_plain_rollers_leave_out(tmp_path, monkeypatch):
+    instantly(monkeypatch.setattr)
+    life = ("[confirmation]", '[[response]]\nname = "life_h"\ngoal = "max"\n\n[confirmation]')
+    path = short_study(tmp_path, replace=life)
+    texts = [note for note in run_design(Problem.load(path), tmp_path, 2, silent).notes if note.startswith("life_h: ")]
+    assert len(texts) == 1 and texts[0].code == "omission" and "half to a fifth" in texts[0]
+    path.write_text(path.read_text("utf-8").replace(*life[::-1]), "utf-8")
+    assert not any("life_h" in note for note in run_design(Problem.load(path), tmp_path, 2, silent).notes)
+    scene = tmp_path / "cylindrical_roller.toml"
+    profiled = scene.read_text("utf-8").replace("[bearing]\n", '[bearing]\nroller_profile = "logarithmic"\n')
+    scene.write_text(profiled, "utf-8")
+    path.write_text(path.read_text("utf-8").replace(*life), "utf-8")
+    assert not any("life_h" in note for note in run_design(Problem.load(path), tmp_path, 2, silent).notes)
+
+
 def test_published_table_loses_the_rows_of_failed_runs(tmp_path, monkeypatch):
     study = Problem.load(short_study(tmp_path))
     instantly(monkeypatch.setattr, faulty=(2, 5))
