@@ -392,10 +392,7 @@ class StartResult(Record, kw_only=True):
     @property
     def lost_clearance(self) -> Notes:
         """A note where the radial clearance is lost on the way, or can be over the inputs."""
-        play, low = (
-            getattr(self, START_FIGURES["start_radial_clearance_um"].name),
-            self.ranges.get("radial_um", (0.0,))[0],
-        )
+        play, low = self.radial_um, self.ranges.get("radial_um", (0.0,))[0]
         if play.least.value < 0.0:
             when = "" if play.time_s is None else f" after {play.time_s:.3g} s"
             return (Note("clearance", f"start: the radial clearance falls to {play.least.value:.0f} µm{when}"),)

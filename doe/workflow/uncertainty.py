@@ -10,20 +10,7 @@ from doe.clearance import Simulations, responses_of, work_of
 from doe.duty import Simulated
 from doe.running.runner import ANSWER, Stage
 from doe.running.store import Failure
-from doe.unknown.propagation import (
-    Emulated,
-    Range,
-    Runs,
-    Share,
-    VarianceShares,
-    emulated,
-    explained,
-    range_of,
-    residual_variance,
-    shapley,
-    sobol,
-    variance_by_cause,
-)
+from doe.unknown import propagation
 from doe.workflow.input_sets import (
     Case,
     Sets,
@@ -66,12 +53,12 @@ class OutputRange(Record):
     """
 
     nominal: Quantity = spread()
-    input: Range
-    variance: VarianceShares
-    first: dict[str, Share] | None
-    total: dict[str, Share] | None
-    shapley: dict[str, Share] | None
-    floor: Share | None
+    input: propagation.Range
+    variance: propagation.VarianceShares
+    first: dict[str, propagation.Share] | None
+    total: dict[str, propagation.Share] | None
+    shapley: dict[str, propagation.Share] | None
+    floor: propagation.Share | None
     q2: float
     ceiling: float
     trusted: bool
@@ -84,7 +71,7 @@ class OutputRange(Record):
         return self.variance.inputs == 0.0
 
     @property
-    def shares(self) -> dict[str, Share]:
+    def shares(self) -> dict[str, propagation.Share]:
         """Share of each input, its total index or its Shapley effect; empty where they are unknown."""
         return self.total or self.shapley or {}
 
@@ -142,8 +129,8 @@ def find_uncertainty(
     while True:
         case, sets = _varying(case, replicated_sets(case, joint.sets(count, seed), simulations, effort), idle)
         fitted = [_emulated(case, sets, nominal, place) for place in range(len(case.outputs))]
-        ranges = [range_of(emulator, fresh_sets, seed) for _, emulator in fitted]
-        if effort < MOST_EFFORT and any(variance_by_cause(*pair).simulation > NOISY for pair in fitted):
+        ranges = [propagation.range_of(emulator, fresh_sets, seed) for _, emulator in fitted]
+        if effort < MOST_EFFORT and any(propagation.variance_by_cause(*pair).simulation > NOISY for pair in fitted):
             effort *= 2
         elif count < MOST and any(interval.relative_error > target for interval in ranges):
             count *= 2
@@ -204,21 +191,27 @@ def _idle_notes(idle: Mapping[str, float]) -> list[Note]:
     ]
 
 
-def _emulated(case: Case, sets: Sets, nominal: Simulated, place: int) -> tuple[Runs, Emulated]:
+def _emulated(case: Case, sets: Sets, nominal: Simulated, place: int) -> tuple[propagation.Runs, propagation.Emulated]:
     numerical = nominal.responses[case.outputs[place]].numerical_error or 0.0
-    runs = Runs(sets.quantiles, *sets.outputs.at((slice(None), place)), (numerical / NORMAL) ** 2)
-    return runs, emulated(runs, case.uncertain.inputs, declared(case))
+    runs = propagation.Runs(sets.quantiles, *sets.outputs.at((slice(None), place)), (numerical / NORMAL) ** 2)
+    return runs, propagation.emulated(runs, case.uncertain.inputs, declared(case))
 
 
 def _output(
-    case: Case, nominal: Simulated, name: str, interval: Range, runs: Runs, fitted: Emulated, fresh_sets: Array
+    case: Case,
+    nominal: Simulated,
+    name: str,
+    interval: propagation.Range,
+    runs: propagation.Runs,
+    fitted: propagation.Emulated,
+    fresh_sets: Array,
 ) -> OutputRange:
     inputs, seed = [case.every[place] for place in fitted.columns[:-1]], case.uncertain.seed
-    by_key = dict[str, dict[str, Share] | None](first=None, total=None, shapley=None)
+    by_key = dict[str, dict[str, propagation.Share] | None](first=None, total=None, shapley=None)
     floor, joint = None, case.joint(inputs)
     if fitted.trusted:
-        effects = sobol(fitted, joint.inputs + 1, seed)._asdict() if joint.independent else {}
-        effects = effects or {"shapley": shapley(fitted, joint, seed)}
+        effects = propagation.sobol(fitted, joint.inputs + 1, seed)._asdict() if joint.independent else {}
+        effects = effects or {"shapley": propagation.shapley(fitted, joint, seed)}
         # The last is that of an input without effect.
         by_key |= {
             kind: dict(zip((entry.key for entry in inputs), shares, strict=False)) for kind, shares in effects.items()
@@ -227,14 +220,14 @@ def _output(
     return OutputRange(
         nominal=nominal.responses[name],
         input=interval,
-        variance=variance_by_cause(runs, fitted),
+        variance=propagation.variance_by_cause(runs, fitted),
         **by_key,
         floor=floor,
         q2=fitted.q2,
         ceiling=fitted.ceiling,
         trusted=fitted.trusted,
         name=name,
-        explained=explained(fitted, fitted(fresh_sets), residual_variance(fitted.emulator)),
+        explained=propagation.explained(fitted, fitted(fresh_sets), propagation.residual_variance(fitted.emulator)),
     )
 
 
