@@ -57,19 +57,11 @@ class Orbit(Record):
 
 
 def orbit_measures(orbit: Complex, play: float, samples_per_turn: float = SAMPLES_A_TURN) -> Orbit:
-    """Measures of an ``orbit`` (m, evenly sampled) in a radial ``play`` (m).
+    """Measures of an ``orbit`` (m, evenly sampled) of at least a cage turn in a radial ``play`` > 0 (m).
 
     The rate is the turn of the phase from the first sample to the last, over cage turns. The main line has all that lies
     within 10 % of its frequency, or two bins.
-
-    Raises ValueError where the play is not positive or the orbit has less than one cage turn.
     """
-    if not play > 0:
-        raise ValueError(f"The radial clearance of the cage is {play} m; the verdict needs a clearance above 0.")
-    if len(orbit) < samples_per_turn:
-        raise ValueError(
-            f"The orbit has {len(orbit)} samples; the verdict needs at least a cage turn of {samples_per_turn:g}."
-        )
     centre = orbit.mean()
     motion = orbit - centre
     power = np.abs(np.fft.fft(motion)) ** 2
@@ -91,14 +83,8 @@ def mean_measures(orbit: Complex, play: float, samples_per_turn: float = SAMPLES
     """Measures of a long ``orbit``: the mean over blocks of ten cage turns, which overlap by half and cover it.
 
     Blocks of one length make the measures of a longer orbit those of a shorter one. The radius is a root mean square.
-
-    Raises ValueError as ``orbit_measures``, and for an orbit shorter than a block.
     """
     length = round(BLOCK_TURNS * samples_per_turn)
-    if len(orbit) < length:
-        raise ValueError(
-            f"The orbit has {len(orbit) / samples_per_turn:.3g} cage turns; the verdict needs at least {BLOCK_TURNS}."
-        )
     spare = len(orbit) - length
     starts = np.linspace(0, spare, round(2 * spare / length) + 1).astype(int)
     blocks = [orbit_measures(orbit[start : start + length], play, samples_per_turn) for start in starts]
