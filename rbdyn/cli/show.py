@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
 
 from rbdyn.base.blocks import Block, Detail, Paragraph, Table, with_notes
-from rbdyn.base.faults import refuse
+from rbdyn.base.faults import MethodError, refuse
 from rbdyn.base.files import versions, write_json
 from rbdyn.base.notes import DANGER, Note, Notes, of_level
 from rbdyn.base.records import Record, plain, save_table
@@ -65,7 +65,7 @@ def request_of(path: Path, turns: float | None, replicate: int) -> Request:
     result = SimulationResult.load(path)
     scene = simulated_scene(result, f"{path}: scene")
     numerics, faults = scene.numerics, []
-    fewest = FEWEST_SAMPLES / numerics.samples_per_turn
+    fewest = min(FEWEST_SAMPLES / numerics.samples_per_turn, numerics.turns)
     most = min(most_turns(scene), numerics.turns)
     counted_turns = min(SHOWN_TURNS, most) if turns is None else turns
     if turns is not None and not fewest <= turns <= numerics.turns:
@@ -180,8 +180,12 @@ def _race(motion: "History", race: "Race") -> dict[str, float]:
 
 
 def _life(motion: "History") -> dict[str, float | str | None]:
-    """Of the contact loads shown; None where nothing is loaded or nothing turns."""
-    life, method = motion.life(), "ISO/TS 16281 reference life from the contact loads over time"
+    """Of the contact loads shown; None where nothing is loaded, nothing turns, or rollers were not seen all around."""
+    method = "ISO/TS 16281 reference life from the contact loads over time"
+    try:
+        life = motion.life()
+    except MethodError as error:
+        return {"L10_Mrev": None, "L10_h": None, "equivalent_load_N": None, "method": f"none: {error}"}
     figures = life.figures(*motion.scene.operation.speeds)
     turns, hours = figures.L10_Mrev, figures.L10_h
     return {"L10_Mrev": turns, "L10_h": hours, "equivalent_load_N": life.equivalent_load, "method": method}

@@ -169,6 +169,17 @@ def test_show_bad_input(command, saved, tmp_path):
     assert json.loads(command("show", tmp_path, "--json").stdout)["status"] == "refused"
 
 
+def test_show_few_samples(command, tmp_path):
+    """Show: motion in so few samples that no roller was seen in some directions has all but a life."""
+    coarse = "--set", "numerics.samples_per_turn=8", "--turns", "3"
+    assert command("simulate", EXAMPLE, *QUICK, *coarse, "--out", tmp_path, "-q").returncode == 0
+    assert request_of(tmp_path, 3.0, 1).turns == 3.0
+    done = command("show", tmp_path, "--json")
+    assert (done.returncode, done.stderr) == (0, "")
+    life = json.loads(done.stdout)["life"]
+    assert life["L10_h"] is None and life["method"].startswith("none: no roller passed some of the 72 sectors")
+
+
 def test_show_other_versions(saved, tmp_path):
     """Show: a result of other versions is shown with a warning."""
     record = json.loads((saved / "result.json").read_text())
