@@ -198,7 +198,7 @@ def _nothing(robust: Robust, decision: Decision) -> str:
     most = min(max((decider.worth_interval[1] for decider in decision.inputs), default=0.0), 1.0 - max(p, 1.0 - p))
     return (
         "No measurement of one unknown is worth making: it would raise the chance of the right choice by at most "
-        f"{math.ceil(100.0 * most):.0f} points{_lost(robust)}."
+        f"{counted(math.ceil(100.0 * most), 'point')}{_lost(robust)}."
     )
 
 

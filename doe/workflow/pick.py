@@ -110,7 +110,7 @@ def searched_pick(
 def _share_words(shares: Array, row: int) -> str:
     """How often this point is the pick under the errors of its simulation, and the most frequent other one."""
     others = np.delete(shares, row)
-    rival = f", another in {100.0 * others.max():.0f}" if others.size and others.max() > 0.0 else ""
+    rival = f", another in {100.0 * others.max():.0f}" if others.size and others.max() >= 0.005 else ""
     return f"; the same point is selected in {100.0 * shares[row]:.0f} of 100 draws of the simulation's errors{rival}"
 
 

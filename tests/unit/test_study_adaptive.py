@@ -19,6 +19,7 @@ from doe.report.sections.front import spent_sentence
 from doe.running.store import STORE, Store
 from doe.workflow.adaptive import advice, border_of, check_adaptive, compare_fronts, find_adaptive, region_in_units
 from doe.workflow.front_record import SearchResult
+from doe.workflow.pick import _share_words as share_words
 from doe.workflow.problem import Problem
 from doe.workflow.surfaces import fit_surfaces
 from rbdyn.base.faults import InputError
@@ -138,6 +139,11 @@ def test_invariant_same_bits_for_any_number_of_workers_and_after_an_interruption
         assert np.array_equal(one.front.points, other.front.points)
         assert np.array_equal(one.front.values, other.front.values)
         assert repr(one.search.history) == repr(other.search.history)
+
+
+def test_a_rival_that_rounds_to_no_draw_is_not_named():
+    assert share_words(np.array([0.998, 0.002]), 0).endswith("selected in 100 of 100 draws of the simulation's errors")
+    assert share_words(np.array([0.9, 0.08, 0.02]), 0).endswith("errors, another in 8")
 
 
 def test_runs_that_fail_are_told_and_left_out(tmp_path, monkeypatch):
