@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from ball_scenes import DEEP, changed, scene
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -37,9 +38,9 @@ def test_invariant_rolling_without_slip(gamma, outer):
 
 
 def test_unit_ball_without_pitch_circle_is_refused():
-    """Unit: a ball as large as its pitch circle is refused by name."""
-    with pytest.raises(ValueError, match="make the ball smaller"):
-        rolling(0.1, 0.1, 0.0)
+    """Unit: a ball as large as its pitch circle is refused by name when the scene is read."""
+    with pytest.raises(InputError, match=r"ball_diameter_mm = 65: .*make the ball smaller"):
+        scene(changed(DEEP, bearing={"ball_diameter_mm": DEEP["bearing"]["pitch_diameter_mm"]}))
 
 
 def test_unit_signs_of_each_error():
