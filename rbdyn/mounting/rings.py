@@ -25,7 +25,8 @@ from rbdyn.properties.materials import Material
 class Ring(Record):
     """A ring, a solid (inner radius 0) or hollow shaft, or a housing.
 
-    Radii [m]; ``temperature_rise`` above the temperature of the drawing [K], uniform; ``speed`` [rad/s]."""
+    Radii [m]; ``temperature_rise`` above the temperature of the drawing [K], uniform; ``speed`` [rad/s].
+    """
 
     inner_radius: float
     outer_radius: float

@@ -12,6 +12,7 @@ import rigid_rings
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from rbdyn import BallScene, equilibrium
 from rbdyn.contact.point_contact import ball_on_race
 from rbdyn.life import balls as life
 
@@ -228,3 +229,37 @@ def test_invariants_of_life(loads, factor):
     assert life.standing_race_load(loads[None]) >= life.turning_race_load(loads[None]) * (1.0 - 1e-12)
     rounds = np.array([np.roll(loads, k) for k in range(12)])
     assert life.standing_race_load(rounds) == pytest.approx(life.turning_race_load(rounds), rel=1e-9)
+
+
+@pytest.mark.parametrize("tilts", [True, False])
+def test_oracle_rigid_rings_are_the_full_model_at_rest(tilts):
+    """Oracle: without speed the full model's two contacts in line are one spring: same place, loads and angles."""
+    row = rigid_rings.rigid_row(
+        10, 4.85e-3, 18e-3, 0.52, 0.53, MODULUS,
+        free_contact_angle=math.radians(15.0), nominal_angle=math.radians(15.0),
+    )  # fmt: skip
+    rest = rigid_rings.distribution(row, 150.0, 90.0, tilts=tilts)
+    steel = {"elastic_modulus_GPa": 210.0, "poisson_ratio": 0.3, "density_kg_m3": 7850.0}
+    scene = BallScene.from_dict(
+        {
+            "bearing": {
+                "kind": "angular_contact_ball",
+                "balls": 10,
+                "ball_diameter_mm": 4.85,
+                "pitch_diameter_mm": 18.0,
+                "contact_angle_deg": 15.0,
+                "inner_groove_factor": 0.52,
+                "outer_groove_factor": 0.53,
+            },
+            "operation": {"radial_load_N": 150.0, "axial_load_N": 90.0, "tilt": "free" if tilts else "fixed"},
+            "materials": {"ball": steel, "rings": steel},
+        }
+    )
+    solution = equilibrium(scene).rows[0]
+    loaded = rest.load > 0.0
+    assert solution.inner_load == pytest.approx(rest.load, rel=1e-6, abs=1e-6)
+    assert solution.outer_load == pytest.approx(rest.load, rel=1e-6, abs=1e-6)
+    assert solution.inner_angle[loaded] == pytest.approx(rest.angle[loaded], rel=1e-6)
+    assert solution.displacement[[0, 2]] == pytest.approx((rest.radial, rest.axial), rel=1e-6)
+    # A tilt about y lowers the axial place of the balls along x; the standard takes the sine.
+    assert -solution.displacement[4] == pytest.approx(math.sin(rest.tilt), rel=1e-5, abs=1e-12)

@@ -50,6 +50,11 @@ def test_unit_crown_is_a_circle(radius, share):
     assert drop == pytest.approx(x**2 / (2.0 * radius), rel=0.3 * (x / radius) ** 2 + 1e-15, abs=1e-300)
 
 
+def test_unit_crown_reaches_the_end_of_the_roller():
+    """Unit: the drop of a half circle at its end is its radius."""
+    assert profile.crowned_relief(np.array([5e-3]), 5e-3)[0] == pytest.approx(5e-3)
+
+
 def displacement(x, half_width, load):
     """Approach of two steel half-spaces on the centre line at x, under a strip of Hertz's pressure of length LENGTH.
 
