@@ -24,9 +24,9 @@ from doe.report.summary import Summary, readable
 from doe.response_surface import Surface
 from doe.response_surface.statistics import fits_of
 from doe.running.store import grouped
-from doe.workflow.confirmation import ConfirmedPoint, PickLimit, point_words, statement
-from doe.workflow.duty import DutyAnswer
+from doe.workflow.confirmation import ConfirmedPoint, PickLimit, point_words, statement, whirl_sentence
 from doe.workflow.front_record import EstimatedPoint, SearchResult, SurfaceFront, predicted_rows
+from doe.workflow.obstacles import Forecast, rivals_sentences
 from doe.workflow.problem import Asked, Problem, Settings
 from doe.workflow.runs import Runs, StudyDesign
 from doe.workflow.status import study_identity
@@ -139,6 +139,7 @@ def summary(outcome: StudyResult) -> Summary:
     """The record of ``doe study --json``."""
     study, tolerances, gains = outcome.study, outcome.tolerances, outcome.gains["pick"]
     odds = {} if outcome.robust is None else outcome.robust.odds
+    forecast = Forecast(study, outcome.front, outcome.adaptive, outcome.searched_pick)
     return Summary(
         format=FORMAT,
         identity=study_identity("doe study", study),
@@ -160,8 +161,8 @@ def summary(outcome: StudyResult) -> Summary:
         },
         gains=gains,
         statement=statement(gains),
-        whirl_sentence=outcome.whirl_sentence,
-        rivals_sentences=outcome.rivals_sentences,
+        whirl_sentence=whirl_sentence(study, outcome.confirmed),
+        rivals_sentences=rivals_sentences(forecast, outcome.confirmed),
         chains=dict(outcome.chains),
         made=outcome.made,
         missed_chains=outcome.missed_chains,
@@ -172,7 +173,7 @@ def summary(outcome: StudyResult) -> Summary:
         versions=versions(),
         inputs=outcome.inputs,
         seeds={"design": study.file.design.seed, "front": study.file.front.seed, "adaptive": study.file.adaptive.seed},
-        duty=_duty(outcome),
+        duty=outcome.duty,
         adaptive=_search(outcome),
         robust=outcome.robust,
         tolerances=None if tolerances is None else tolerances.by_factor,
@@ -180,15 +181,6 @@ def summary(outcome: StudyResult) -> Summary:
         tolerances_sentence=None if tolerances is None else tolerances.sentence,
         tolerances_warning=None if tolerances is None else tolerances.warning,
     )
-
-
-def _duty(outcome: StudyResult) -> DutyAnswer | None:
-    """The answer over the duty with the clearances in operation at its points."""
-    if outcome.duty is None:
-        return None
-    clearances = outcome.clearances_at_points
-    points = [replace(point, operating_clearances_mm=clearances[point.name].operating) for point in outcome.duty.points]
-    return replace(outcome.duty, points=points)
 
 
 def _search(outcome: StudyResult) -> SearchResult | None:

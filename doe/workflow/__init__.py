@@ -1,8 +1,7 @@
 """The steps of a study, and the whole study that joins them.
 
 - ``problem``: a study resolved once, with its goals, region and scenes, for every step, and what it asks
-- ``region``: where its bearings run; ``design``: its points; ``runs``: its runs; ``replication``: their
-  replicates by need
+- ``region``: where its bearings run; ``design``: its points; ``runs``: its runs with their replicates by need
 - ``surfaces``: fits, predictions, random draws, a published table; ``front``: tolerances, the front on surfaces, back-off from
   limits; ``adaptive``: the front by emulators; ``front_record``: the records of both
 - ``pick``: the point of the front, the edge of the region; ``tolerances``: its widest ones

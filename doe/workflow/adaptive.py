@@ -24,8 +24,7 @@ from doe.running.store import Failure, grouped
 from doe.workflow.confirmation import Limit
 from doe.workflow.front import named_faults
 from doe.workflow.problem import Problem
-from doe.workflow.replication import independent_values, standard_errors
-from doe.workflow.runs import Runs
+from doe.workflow.runs import Runs, independent_values, standard_errors
 from rbdyn.base.arrays import Array, Whole, one_thread
 from rbdyn.base.faults import InputError, MethodError, RunError, refuse
 from rbdyn.base.records import Record

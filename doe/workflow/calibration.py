@@ -22,21 +22,9 @@ from doe.unknown import inputs as unknown
 from doe.unknown.calibration import TRIED, Batch, Unknowns, matched, sets_a_wave
 from doe.unknown.posterior import Measured
 from doe.unknown.width import OFTEN, power_of
+from doe.workflow import input_sets
 from doe.workflow.identification import BEFORE, Calibration, Design, Evidence, identified
-from doe.workflow.input_sets import (
-    Case,
-    case_of,
-    check_holes,
-    check_overrides,
-    impossible,
-    laws_of,
-    outcomes,
-    outputs_with_scatter,
-    override_notes,
-    screen_inputs,
-    tables_of,
-    work_of_set,
-)
+from doe.workflow.input_sets import Case, check_holes, impossible, laws_of, outcomes, tables_of
 from doe.workflow.rig import MOST_CONDITIONS, SPEED, Rig, read_rig
 from rbdyn.base.arrays import Array, one_thread
 from rbdyn.base.faults import Claims, InputError, RunError, key_path, refuse
@@ -111,15 +99,15 @@ def read_question(path: Path, data: Path, free: Sequence[str], overrides: Sequen
     changes = {"estimated": estimated, "defaults": "documented"}
     declared = uncertain.model_copy(update=changes if free else {})
     fixed = {key: f"a column of {data}" for row in rig.rows for key in row.keys}
-    case = case_of(str(path), tables, rig.outputs, declared, fixed)
+    case = input_sets.case_of(str(path), tables, rig.outputs, declared, fixed)
     targets = [
         candidate for candidate in case.every if candidate.law.kind == "unknown" and (not free or candidate.key in free)
     ]
-    check_overrides(overrides, targets, fixed)
+    input_sets.check_overrides(overrides, targets, fixed)
     notes = [
         *rig.notes,
         *case.remarks,
-        *override_notes(case, overrides),
+        *input_sets.override_notes(case, overrides),
         *(_varies(candidate) for candidate in case.every if candidate.law.kind == "varies"),
     ]
     refuse(
@@ -250,7 +238,7 @@ class _Rows:
         conditions, names = np.array(self.cells).T
         sets = np.arange(0, len(results), len(self.cases))[:, None]
         # The order of cells in memory decides the last bits of sums over the sets.
-        cells = outputs_with_scatter(self.outputs, results).at((np.asfortranarray(sets + conditions), names))
+        cells = input_sets.outputs_with_scatter(self.outputs, results).at((np.asfortranarray(sets + conditions), names))
         outputs = cells.values
         if not (outputs > 0.0).all():
             name = self.outputs[names[int(np.argmin(outputs.min(axis=0)))]]
@@ -266,7 +254,7 @@ def find_calibration(question: Question, simulations: Simulations) -> Calibratio
     case, targets, rig, notes = question
     conditions = rig.conditions
     cases = cases_of(case, rig)
-    inputs, fixed_shares = screen_inputs(replace(case, every=targets), simulations)
+    inputs, fixed_shares = input_sets.screen_inputs(replace(case, every=targets), simulations)
     places = [(row, name) for row in rig.rows for name in row.values]
     cell_places = [(conditions.index(row.keys), rig.outputs.index(name)) for row, name in places]
     rows = _Rows(cases, inputs, rig.outputs, cell_places, simulations)
@@ -380,7 +368,7 @@ def _unknowns(inputs: Sequence[Input]) -> Unknowns:
 
 def calibration_stages(question: Question) -> list[Stage]:
     """Stages of ``doe calibrate``; fewer waves may do. Raises InputError."""
-    return _stages(question.case, question.rig, question.targets, work_of_set(question.case))
+    return _stages(question.case, question.rig, question.targets, input_sets.work_of_set(question.case))
 
 
 def _stages(case: Case, rig: Rig, targets: Sequence[Input], work: float) -> list[Stage]:

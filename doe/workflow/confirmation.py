@@ -88,6 +88,11 @@ class Confirmed(Record):
             name: simulated_scene(run) for name, run in results.items() if run is not None and run.thermal is not None
         }
 
+    def scenes(self, study: Problem) -> dict[str, Scene]:
+        """Scenes of its runs by point of the duty, or under EVERYWHERE; with a heat balance at the temperatures of these runs."""
+        run = study.confirmation_run(self.point)
+        return ({EVERYWHERE: run} if isinstance(run, Scene) else dict(run.scenes)) | self.hot
+
     @property
     def cages(self) -> dict[str, CageVerdict]:
         """Verdict on the cage by point of the duty, or under "operation"; empty where its scene leaves it out."""

@@ -2,14 +2,14 @@
 
 The pick is the compromise of all points. The front on the surfaces of one point's runs alone has a pick of its own. The change from
 the study's pick to that, on these surfaces, is what the compromise costs at the point; no run is made for it.
+
+With or without a duty: the clearances in operation at baseline and pick.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import field
-from types import MappingProxyType
 from typing import Any
 
-from doe.duty import DutyResult, scenes_of
+from doe.duty import DutyResult
 from doe.study_file.study import PointResponse, Response
 from doe.workflow.confirmation import Confirmed, Gain, gains
 from doe.workflow.front import find_front, out_of_reach
@@ -17,15 +17,78 @@ from doe.workflow.problem import Problem
 from doe.workflow.runs import Runs
 from doe.workflow.surfaces import PredictedGain, fit_surfaces, predict_all, predicted_gains
 from rbdyn.base.arrays import Array, one_thread
-from rbdyn.base.faults import InputError
+from rbdyn.base.faults import InputError, MethodError
 from rbdyn.base.records import Record, finite, keyed
 from rbdyn.base.words import chance
+from rbdyn.clearances import REPORTED
 from rbdyn.life import DutyLife, DutyLifeFigures
+from rbdyn.properties.catalogue import classes_at
 from rbdyn.result import SimulatedValue, arrays_of
 from rbdyn.scene import Scene
+from rbdyn.scene.notes import catalogue_entry
 
 # Most generations of the search for the pick of a point alone, of which no run is made.
 GENERATIONS = 50
+RADIAL = "bearing.radial_clearance_mm"
+# Clearance of a scene by the key of its value on the drawing.
+NAMES = {clearance.key: clearance.name for clearance in REPORTED}
+
+
+class OperatingClearances(Record):
+    """Factors that are clearances, at the baseline and at the pick.
+
+    ``operating``: by factor, the clearance in operation [mm] by name of the point; empty without [mounting], because
+    nothing else changes it. ``class_sentence``: the class of the pick's radial clearance by ISO 5753-1; empty if that is
+    no factor or the bore is unknown.
+    """
+
+    operating: dict[str, dict[str, float]]
+    class_sentence: str
+
+
+def operating_clearances(study: Problem, points: Mapping[str, Scene]) -> OperatingClearances:
+    """Clearances in operation of scenes by name of their point, "pick" among them."""
+    operating = {
+        factor.name: {name: _operating_mm(scene, factor.key) for name, scene in points.items()}
+        for factor in study.file.factor
+        if factor.key in NAMES and all(_changes(scene, factor.key) for scene in points.values())
+    }
+    radial = any(factor.key == RADIAL for factor in study.file.factor)
+    pick = points["pick"]
+    bore, drawn_um = bore_of(pick), 1e3 * pick.bearing.radial_clearance_mm
+    class_words = "" if bore is None or not radial else class_sentence(bore, drawn_um, pick.bearing.kind)
+    return OperatingClearances(operating, class_words)
+
+
+def bore_of(scene: Scene) -> float | None:
+    """Bore of the bearing [mm]; None if the scene does not state it."""
+    if scene.mounting is not None:
+        return scene.mounting.bore_mm
+    listed = catalogue_entry(scene.bearing)
+    return None if listed is None else listed[1].bore
+
+
+def class_sentence(bore: float, drawn_um: float, kind: str) -> str:
+    """The classes of ISO 5753-1 that hold a drawn radial clearance [um] at a bore [mm]; empty beyond the table of bores."""
+    try:
+        classes = classes_at(bore, drawn_um, kind)
+    except MethodError:
+        return ""
+    clearance_words = f"ISO 5753-1 at a bore of {bore:g} mm: the selected radial clearance of {drawn_um:.3g} um"
+    if not classes:
+        return f"{clearance_words} falls in no class."
+    first, *others = (f"{iso_class.name} ({iso_class.lower:g} to {iso_class.upper:g} um)" for iso_class in classes)
+    return f"{clearance_words} falls in {first}{f', also in {others[0]}' if others else ''}."
+
+
+def _changes(scene: Scene, key: str) -> bool:
+    return scene.mounting is not None and scene.clearances[NAMES[key]] is not None
+
+
+def _operating_mm(scene: Scene, key: str) -> float:
+    play = scene.clearances[NAMES[key]]
+    assert play is not None
+    return 1e3 * play.operating
 
 
 class OwnPick(Record):
@@ -55,7 +118,7 @@ class AtPoint(Record):
     gains: dict[str, Gain]
     own: OwnPick | None
     own_note: str
-    operating_clearances_mm: dict[str, dict[str, float]] = field(default_factory=dict)
+    operating_clearances_mm: dict[str, dict[str, float]]
     origin: str | None = keyed("from", default=None)
 
 
@@ -102,7 +165,8 @@ def duty_answer(study: Problem, runs: Runs, confirmed: Mapping[str, Confirmed]) 
     if not study.shares:
         return None
     baseline, pick = confirmed["baseline"], confirmed["pick"]
-    points = []
+    both = {"baseline": baseline, "pick": pick}
+    scenes, points = {end: point.scenes(study) for end, point in both.items()}, []
     for point in study.file.duty:
         name, here = point.name, study_at(study, point.name)
         ends = [_at_point(here, end, name) for end in (baseline, pick)]
@@ -116,38 +180,29 @@ def duty_answer(study: Problem, runs: Runs, confirmed: Mapping[str, Confirmed]) 
             for end in (baseline, pick)
         )
         at_ends = gains(here, *ends)
-        points.append(
-            AtPoint(name, study.shares[name], [*point.set], before, after, at_ends, alone, note, origin=point.origin)
-        )
+        plays = operating_clearances(study, {end: at_points[name] for end, at_points in scenes.items()}).operating
+        ours = (name, study.shares[name], [*point.set], before, after, at_ends, alone, note, plays, point.origin)
+        points.append(AtPoint(*ours))
     aggregate: dict[str, str] = {
         response.name: response.aggregate for response in study.file.response if not isinstance(response, PointResponse)
     }
-    both, names = {"baseline": baseline, "pick": pick}, [point.name for point in points]
+    names = [point.name for point in points]
     worst = {
         end: {response: WorstPoint(*worst) for response, worst in confirmed.result.worst.items()}
         for end, confirmed in both.items()
         if isinstance(confirmed.result, DutyResult)
     }
-    hot = {end: point.hot for end, point in both.items()}
-    life = lives(study, {end: point.point for end, point in both.items()}, hot)
-    return DutyAnswer(points, aggregate, worst, {end: LifeOverDuty.of(figures, names) for end, figures in life.items()})
+    life = {end: LifeOverDuty.of(figures, names) for end, figures in lives(study, scenes).items()}
+    return DutyAnswer(points, aggregate, worst, life)
 
 
-def lives(
-    study: Problem, ends: Mapping[str, Array], hot: Mapping[str, Mapping[str, Scene]] = MappingProxyType({})
-) -> dict[str, DutyLife]:
-    """Life over the duty of the original design, "baseline", and of others, points (k,) by name.
-
-    ``hot``: scenes at the temperatures of a heat balance by name of the design and point.
-    """
+def lives(study: Problem, ends: Mapping[str, Mapping[str, Scene]]) -> dict[str, DutyLife]:
+    """Life over the duty of designs by name, of their scenes at each point."""
     from rbdyn.dynamics.part_figures import roller_duty_life
 
-    names, life = [point.name for point in study.file.duty], {}
-    for name, place in ends.items():
-        run = study.confirmation_run(place)
-        by_name = {**dict(zip(study.shares, scenes_of(run), strict=True)), **hot.get(name, {})}
-        life[name] = roller_duty_life([by_name[point] for point in names], [study.shares[point] for point in names])
-    return life
+    names = [point.name for point in study.file.duty]
+    shares = [study.shares[name] for name in names]
+    return {end: roller_duty_life([scenes[name] for name in names], shares) for end, scenes in ends.items()}
 
 
 def study_at(study: Problem, name: str) -> Problem:

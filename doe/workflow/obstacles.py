@@ -24,23 +24,13 @@ from doe.pareto import Goals, ParetoFront
 from doe.running.runner import Progress
 from doe.running.store import Failure
 from doe.study_file.study import PointResponse
+from doe.workflow import confirmation
 from doe.workflow.adaptive import Adaptive
-from doe.workflow.confirmation import (
-    ORDER,
-    Confirmed,
-    Limit,
-    Verdict,
-    class_limits,
-    every_limit,
-    limits_of,
-    point_words,
-    run_where_possible,
-    verdict_of,
-)
+from doe.workflow.confirmation import ORDER, Confirmed, Limit, Verdict, class_limits, every_limit, limits_of, verdict_of
 from doe.workflow.front import tolerance_box, tolerances_out_of_reach
 from doe.workflow.pick import SearchedPick, place_of, sides_of
 from doe.workflow.problem import Problem
-from doe.workflow.replication import standard_errors
+from doe.workflow.runs import standard_errors
 from doe.workflow.surfaces import predict_all, quadratics
 from doe.workflow.tolerances import PickTolerances
 from rbdyn.base.arrays import Array, Mask
@@ -266,7 +256,7 @@ def _least_move(study: Problem, pick: Confirmed, sides: Array, places: list[int]
         beyond = column - limit.bound if limit.sense == "<=" else limit.bound - column
         broken |= beyond > -limit.margin
     first = next(iter(points[~broken]), None)
-    return None if first is None or run_where_possible(study, first) is None else np.asarray(first)
+    return None if first is None or confirmation.run_where_possible(study, first) is None else np.asarray(first)
 
 
 def original_sentences(study: Problem, baseline: Confirmed) -> list[str]:
@@ -412,7 +402,7 @@ def better_points(study: Problem, confirmed: Mapping[str, Confirmed]) -> list[st
 def rivals_sentences(forecast: Forecast, confirmed: Mapping[str, Confirmed]) -> list[str]:
     """For each point that is better than the pick in every response as simulated: why it is not the pick, in one sentence."""
     return [
-        f"Point {point_words(name)} is better than the selected design in every response as simulated"
+        f"Point {confirmation.point_words(name)} is better than the selected design in every response as simulated"
         f"{_uncertain(forecast.study, confirmed[name], confirmed['pick'])}, {_reason(forecast, confirmed[name], confirmed['pick'])}."
         for name in better_points(forecast.study, confirmed)
     ]

@@ -19,22 +19,9 @@ from doe.pareto.front import pick_shares
 from doe.pareto.tolerance import Neighbourhood, SimulatedAware, pick_among, simulated_aware
 from doe.response_surface.adequacy import REACH
 from doe.running.store import Failure
+from doe.workflow import confirmation
 from doe.workflow.adaptive import Adaptive, emulator_draws
-from doe.workflow.confirmation import (
-    ORDER,
-    TRY,
-    Choice,
-    Confirmed,
-    Limit,
-    LostPickError,
-    class_limits,
-    confirm,
-    confirmed_from,
-    every_limit,
-    limits_of,
-    run_where_possible,
-    verdict_of,
-)
+from doe.workflow.confirmation import ORDER, Choice, Confirmed, Limit, class_limits, every_limit, limits_of, verdict_of
 from doe.workflow.front import SURFACE_DRAWS, Draws, ErrorField, Misses, find_front, standard_errors_of, tolerance_box
 from doe.workflow.problem import Problem
 from doe.workflow.runs import EstimatedValue
@@ -208,7 +195,7 @@ def choose(
             break
         try:
             found = _judged(study, baseline, points["pick"], simulations)
-        except LostPickError:
+        except confirmation.LostPickError:
             # Its run failed like those of the design: the front stays away from there.
             lost += 1
             if searched is not None or lost > LOST:
@@ -237,9 +224,9 @@ def choose(
     pick, front, candidate = trials[best]
     points = choices(study, front, searched, candidate)
     del points["pick"]
-    others, failures = confirm(study, baseline, points, simulations)
+    others, failures = confirmation.confirm(study, baseline, points, simulations)
     tries = {
-        f"{TRY}{number}": replace(point, reason=f"try {number} for the selected design: {point.reason}")
+        f"{confirmation.TRY}{number}": replace(point, reason=f"try {number} for the selected design: {point.reason}")
         for number, (point, _, _) in enumerate(trials, 1)
         if point is not pick
     }
@@ -252,7 +239,7 @@ def _judged(study: Problem, baseline: Confirmed, choice: Choice, simulations: Si
 
     Raises as ``confirm``.
     """
-    found = confirm(study, baseline, {"pick": choice}, simulations)[0]["pick"]
+    found = confirmation.confirm(study, baseline, {"pick": choice}, simulations)[0]["pick"]
     if verdict_of(limits_of(study, found)) != "undecided":
         return found
     settings = study.file.confirmation
@@ -260,7 +247,7 @@ def _judged(study: Problem, baseline: Confirmed, choice: Choice, simulations: Si
     reason = (
         f"{choice.reason}; by {2 * settings.replicates} replicates, as {settings.replicates} left a limit undecided"
     )
-    return confirm(more, baseline, {"pick": replace(choice, reason=reason)}, simulations)[0]["pick"]
+    return confirmation.confirm(more, baseline, {"pick": replace(choice, reason=reason)}, simulations)[0]["pick"]
 
 
 def _promises_less(study: Problem, front: ParetoFront, simulated: Sequence[Confirmed]) -> bool:
@@ -488,7 +475,7 @@ def _gains_by_simulation(
     for index, side in names:
         point = pick.point.copy()
         point[index] += side * AHEAD * study.step[index]
-        if (run := run_where_possible(study, point)) is not None:
+        if (run := confirmation.run_where_possible(study, point)) is not None:
             runs.append(run)
             reachable.append((index, point))
     labels = [f"beyond the bound of {study.factors[index]}" for index, _ in reachable]
@@ -499,7 +486,7 @@ def _gains_by_simulation(
     for (index, point), result in zip(reachable, results, strict=True):
         if isinstance(result, Failure):
             continue
-        outer_point = confirmed_from(study, Choice(point, ""), result)
+        outer_point = confirmation.confirmed_from(study, Choice(point, ""), result)
         gain = (goals.costs(pick.values) - goals.costs(outer_point.values)) / (AHEAD * study.step[index])
         joint = (pick.estimate - outer_point.estimate).half_width[goals.objectives]
         figures = zip(gain.tolist(), (joint / (AHEAD * study.step[index])).tolist(), strict=True)

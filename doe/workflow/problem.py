@@ -148,7 +148,7 @@ class Problem(Study):
 
     def check_responses(self) -> None:
         """Raises InputError for a response that is no figure of the simulation, or a temperature without a heat balance."""
-        heats = any(name in TEMPERATURES for name in self.figures) and self._states("thermal")
+        heats = any(name in TEMPERATURES for name in self.figures) and self.states("thermal")
         names = responses_of(heats)
         refuse(
             f"{self.path}: response.name = {name!r}: "
@@ -169,14 +169,9 @@ class Problem(Study):
             if response.name in TEMPERATURES and response.aggregate == "worst_relative"
         )
 
-    def _states(self, table: str) -> bool:
+    def states(self, table: str) -> bool:
         """Whether the study's scene has a table, in its file or by scene.set."""
         return table in self.scene_tables or any(text.startswith(f"{table}.") for text in self.scene.set)
-
-    @property
-    def has_mounting(self) -> bool:
-        """Whether anything changes the clearances of the drawing."""
-        return self._states("mounting")
 
     @cached_property
     def scene_tables(self) -> dict[str, Any]:
@@ -417,18 +412,14 @@ class Problem(Study):
         scene = self.scene_at(point, seed, [*sets, *effort, *settings.set], confirms=True)
         needed = scene.verdict.limits.fewest_replicates
         if self.file.limits.classes and settings.replicates < needed:
-            refuse(
-                [
-                    f"{self.path}: confirmation.replicates = {settings.replicates}: limits.cage.verdict needs {needed} replicates alike to "
-                    f"name a class; raise it to {needed}"
-                ]
+            raise InputError(
+                f"{self.path}: confirmation.replicates = {settings.replicates}: limits.cage.verdict needs {needed} replicates alike to "
+                f"name a class; raise it to {needed}"
             )
         if self.file.limits.classes and scene.cage_sample_s is None:
-            refuse(
-                [
-                    f"{self.path}: limits.cage.verdict: the scene leaves the verdict out, by verdict.trace, a schedule or a cage "
-                    "without guide; remove the limit"
-                ]
+            raise InputError(
+                f"{self.path}: limits.cage.verdict: the scene leaves the verdict out, by verdict.trace, a schedule or a cage "
+                "without guide; remove the limit"
             )
         return scene
 

@@ -148,7 +148,7 @@ def region_in_store(study: Problem, folder: Path) -> Problem:
 
 def moved_region(study: Problem, balance: Balances, kept: float = KEPT) -> Region:
     """The study with its region moved to where every clearance stays above its floor at every point of the duty."""
-    if not study.has_mounting:
+    if not study.states("mounting"):
         return Region(study)
     heat, notes, near = _heat(study, balance)
     study = original = replace(study, near=near) if near else study

@@ -296,11 +296,6 @@ ROUNDS = 3
 FRESH = 8192
 
 
-def check_robust(study: Problem) -> None:
-    """Raises InputError if the unknown inputs of the study's scene are declared wrongly."""
-    case_of_study(study)
-
-
 @one_thread
 def judge(study: Problem, pick: Array, simulations: Simulations) -> Robust:
     """Judge the pick (k,) against the baseline. Raises InputError, RunError, KeyboardInterrupt."""

@@ -26,8 +26,7 @@ from doe.response_surface.least_squares import backward, forward, slope
 from doe.study_file.study import Fitted
 from doe.study_file.table import read_sheet
 from doe.workflow.problem import Problem
-from doe.workflow.replication import independent_values, standard_errors
-from doe.workflow.runs import Runs, read_runs
+from doe.workflow.runs import Runs, independent_values, read_runs, standard_errors
 from rbdyn.base.arrays import Array, Rows, Whole, one_thread
 from rbdyn.base.faults import InputError, MethodError, refuse
 from rbdyn.base.notes import Note, Notes

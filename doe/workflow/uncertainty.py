@@ -11,16 +11,8 @@ from doe.duty import Simulated
 from doe.running.runner import ANSWER, Stage
 from doe.running.store import Failure
 from doe.unknown import propagation
-from doe.workflow.input_sets import (
-    Case,
-    Sets,
-    declared,
-    override_notes,
-    read_case,
-    replicated_sets,
-    shares_outside,
-    work_of_set,
-)
+from doe.workflow import input_sets
+from doe.workflow.input_sets import Case, Sets, declared, override_notes, replicated_sets
 from rbdyn.base.arrays import Array, one_thread
 from rbdyn.base.faults import LONGEST_NAME, RunError, one_line, refuse
 from rbdyn.base.notes import Note, Notes
@@ -141,7 +133,7 @@ def find_uncertainty(
         for name, interval, pair in zip(case.outputs, ranges, fitted, strict=True)
     ]
     covered_places = {place for _, emulator in fitted for place in emulator.columns.tolist()}
-    outside_shares = shares_outside(case, covered_places, sets.quantiles, sets.signals)
+    outside_shares = input_sets.shares_outside(case, covered_places, sets.quantiles, sets.signals)
     notes = _notes(
         [*_idle_notes(idle), *case.notes, *override_notes(case, overrides, "the run at the scene's own inputs")],
         sets,
@@ -162,7 +154,7 @@ def find_uncertainty(
 
 def _case_of(path: Path, overrides: Sequence[str], figures: Sequence[str] = ()) -> Case:
     """The scene with its unknown inputs and outputs, ``figures`` among them. Raises InputError."""
-    case = read_case(path, OUTPUTS, overrides)
+    case = input_sets.read_case(path, OUTPUTS, overrides)
     names = responses_of(case.scene.thermal is not None)
     refuse(
         f"--figure {one_line(name, LONGEST_NAME)}: not a result of this scene; choose one of {', '.join(names)}"
@@ -276,6 +268,6 @@ def uncertainty_stages(path: Path, overrides: Sequence[str], points: int | None)
     count = case.uncertain.points if points is None else points
     return [
         Stage.of("scene values", 1, work_of(case.scene)),
-        Stage.of("input sets", count, work_of_set(case), most=MOST_EFFORT * max(count, MOST)),
+        Stage.of("input sets", count, input_sets.work_of_set(case), most=MOST_EFFORT * max(count, MOST)),
         Stage(ANSWER),
     ]

@@ -18,102 +18,31 @@ from doe.designs import Design
 from doe.dimension_chain import Chain, ChainResult, chain_from, solve
 from doe.dimension_chain.allocation import Allocation
 from doe.dimension_chain.refusal import allocated_reason
-from doe.duty import OPERATION, Duty, Simulated, scene_at
+from doe.duty import OPERATION, Duty, Simulated
 from doe.pareto import ParetoFront
 from doe.running.runner import ANSWER, AgendaKeeper, Part, Stage, rows_of
 from doe.running.store import Failure
 from doe.workflow import confirmation
 from doe.workflow.adaptive import Adaptive, FrontComparison, advice, check_adaptive, compare_fronts, find_adaptive
 from doe.workflow.design import check_runs
-from doe.workflow.duty import DutyAnswer, duty_answer
+from doe.workflow.duty import DutyAnswer, OperatingClearances, duty_answer, operating_clearances
 from doe.workflow.effort import Effort
 from doe.workflow.front import OutOfReachError, check_goals, find_front, with_survival
-from doe.workflow.obstacles import Forecast, Obstacles, first_look, obstacles_of, rivals_sentences, without_broken
+from doe.workflow.obstacles import Obstacles, first_look, obstacles_of, without_broken
 from doe.workflow.parts import Made, grade_of_parts
-from doe.workflow.pick import Edge, SearchedPick, Selection, choose, draws_about, edge_of, neighbourhood
+from doe.workflow.pick import Edge, SearchedPick, choose, draws_about, edge_of, neighbourhood
 from doe.workflow.problem import Problem
 from doe.workflow.region import region_that_runs
-from doe.workflow.replication import run_by_need
-from doe.workflow.robust import Robust, check_robust, judge
-from doe.workflow.runs import Runs, with_remaining
+from doe.workflow.robust import Robust, case_of_study, judge
+from doe.workflow.runs import Runs, run_by_need, with_remaining
 from doe.workflow.status import DESIGN, FRONT, STEPS_S, TOLERANCES, inputs_digest, shorter_by, study_stages
 from doe.workflow.surfaces import PublishedComparison, compare_with_published, fit_surfaces, reference_runs, with_rivals
 from doe.workflow.tolerances import PickParts, PickTolerances
 from rbdyn.base.arrays import Array, one_thread
 from rbdyn.base.faults import InputError, MethodError, check_all
 from rbdyn.base.notes import Note, Notes
-from rbdyn.base.records import Record
-from rbdyn.clearances import REPORTED
 from rbdyn.life import life_notes
-from rbdyn.properties.catalogue import classes_at
 from rbdyn.scene import Scene
-from rbdyn.scene.notes import catalogue_entry
-
-RADIAL = "bearing.radial_clearance_mm"
-# Clearance of a scene by the key of its value on the drawing.
-NAMES = {clearance.key: clearance.name for clearance in REPORTED}
-
-
-class OperatingClearances(Record):
-    """Factors that are clearances, at the baseline and at the pick.
-
-    ``operating``: by factor, the clearance in operation [mm] by name of the point; empty without [mounting], because
-    nothing else changes it. ``class_sentence``: the class of the pick's radial clearance by ISO 5753-1; empty if that is
-    no factor or the bore is unknown.
-    """
-
-    operating: dict[str, dict[str, float]]
-    class_sentence: str
-
-
-def operating_clearances(study: Problem, points: Mapping[str, Scene]) -> OperatingClearances:
-    """Clearances in operation of scenes by name of their point, "pick" among them."""
-    operating = {
-        factor.name: {name: _operating_mm(scene, factor.key) for name, scene in points.items()}
-        for factor in study.file.factor
-        if factor.key in NAMES and all(_changes(scene, factor.key) for scene in points.values())
-    }
-    radial = any(factor.key == RADIAL for factor in study.file.factor)
-    pick = points["pick"]
-    bore, drawn_um = bore_of(pick), 1e3 * pick.bearing.radial_clearance_mm
-    class_words = "" if bore is None or not radial else class_sentence(bore, drawn_um, pick.bearing.kind)
-    return OperatingClearances(operating, class_words)
-
-
-def scenes_of(study: Problem, baseline: Array, pick: Array) -> dict[str, Scene]:
-    """Scenes of the baseline and of the pick (k,), by name."""
-    return {"baseline": study.confirmation_scene(baseline), "pick": study.confirmation_scene(pick)}
-
-
-def bore_of(scene: Scene) -> float | None:
-    """Bore of the bearing [mm]; None if the scene does not state it."""
-    if scene.mounting is not None:
-        return scene.mounting.bore_mm
-    listed = catalogue_entry(scene.bearing)
-    return None if listed is None else listed[1].bore
-
-
-def class_sentence(bore: float, drawn_um: float, kind: str) -> str:
-    """The classes of ISO 5753-1 that hold a drawn radial clearance [um] at a bore [mm]; empty beyond the table of bores."""
-    try:
-        classes = classes_at(bore, drawn_um, kind)
-    except MethodError:
-        return ""
-    clearance_words = f"ISO 5753-1 at a bore of {bore:g} mm: the selected radial clearance of {drawn_um:.3g} um"
-    if not classes:
-        return f"{clearance_words} falls in no class."
-    first, *others = (f"{iso_class.name} ({iso_class.lower:g} to {iso_class.upper:g} um)" for iso_class in classes)
-    return f"{clearance_words} falls in {first}{f', also in {others[0]}' if others else ''}."
-
-
-def _changes(scene: Scene, key: str) -> bool:
-    return scene.mounting is not None and scene.clearances[NAMES[key]] is not None
-
-
-def _operating_mm(scene: Scene, key: str) -> float:
-    play = scene.clearances[NAMES[key]]
-    assert play is not None
-    return 1e3 * play.operating
 
 
 def check_chains(study: Problem) -> None:
@@ -191,7 +120,7 @@ def check_study(study: Problem, adaptive: bool = False, robust: bool = False) ->
             lambda: study.confirmation_scene(study.baseline),
             lambda: check_chains(study),
             lambda: check_adaptive(study) if adaptive else None,
-            lambda: check_robust(study) if robust else None,
+            lambda: case_of_study(study) if robust else None,
         )
     )
     return reference_runs(study)
@@ -243,8 +172,7 @@ class StudyResult:
     @cached_property
     def scenes(self) -> dict[str, Scene]:
         """Scenes of baseline and pick; those with a heat balance at the temperatures of their runs."""
-        scenes = scenes_of(self.study, self.baseline.point, self.pick.point)
-        return {name: self.confirmed[name].hot.get(self.main_point, scene) for name, scene in scenes.items()}
+        return {name: self.confirmed[name].scenes(self.study)[self.main_point] for name in ("baseline", "pick")}
 
     @property
     def main_point(self) -> str:
@@ -262,18 +190,6 @@ class StudyResult:
     def clearances(self) -> OperatingClearances:
         """Clearances among the factors in operation, at baseline and pick."""
         return operating_clearances(self.study, self.scenes)
-
-    @cached_property
-    def clearances_at_points(self) -> dict[str, OperatingClearances]:
-        """The same at each point of the duty, whose temperatures and speeds differ; empty without a duty."""
-        ends = {"baseline": self.baseline, "pick": self.pick}
-        runs = {name: self.study.confirmation_run(end.point) for name, end in ends.items()}
-        return {
-            point: operating_clearances(
-                self.study, {name: ends[name].hot.get(point, scene_at(run, point)) for name, run in runs.items()}
-            )
-            for point in self.study.shares
-        }
 
     @property
     def made(self) -> dict[str, Made]:
@@ -338,17 +254,6 @@ class StudyResult:
         life = () if duty is None else life_notes(hours, sum(point.share for point in points))
         return (*pick, *life, *runs, *self.notes)
 
-    @property
-    def whirl_sentence(self) -> str:
-        """A warning that the whirl with a goal is that of a trembling cage; else empty."""
-        return confirmation.whirl_sentence(self.study, self.confirmed)
-
-    @property
-    def rivals_sentences(self) -> list[str]:
-        """Why no point that is better in every response as simulated is the pick; none where there is no such point."""
-        forecast = Forecast(self.study, self.front, self.adaptive, self.searched_pick)
-        return rivals_sentences(forecast, self.confirmed)
-
 
 @one_thread
 def run_study(
@@ -378,7 +283,10 @@ def run_study(
         runs = run_by_need(study, simulations, watched, effort.notice)
         clock.lap("design_s", FRONT)
         study, turns = with_remaining(study, runs), runs.turns
-        study, surface_front = _surfaces_and_front(study, runs, clock)
+        study = study.with_surfaces(with_rivals(fit_surfaces(study, runs)))
+        clock.lap("fit_s")
+        surface_front = find_front(study)
+        clock.lap("front_s")
         searched, unsearched = _searched(study, runs, simulations, clock) if adaptive else (None, [])
         selection = choose(study, surface_front, searched, original, simulations)
         confirmed, pick = selection.confirmed, selection.confirmed["pick"].point
@@ -390,6 +298,7 @@ def run_study(
     chains, notes = solve_chains(study, pick, tolerances)
     clock.enter(ANSWER)
     reference = reference and reference.only([place for place in runs.places if place < len(reference.coded)])
+    steps = (runs, searched, robustness, selection)
     notes += [*moves, *unsearched, *(reference.notes if reference else ())]
     return StudyResult(
         study=study,
@@ -409,24 +318,11 @@ def run_study(
         chains=chains,
         published_comparisons={} if reference is None else _compared(study, runs, reference),
         reference_values=None if reference is None else reference.values,
-        failures=_failures(runs, searched, robustness, selection),
+        failures=tuple(failure for step in steps if step for failure in step.failures),
         notes=(*notes, *(Note("advice", text) for text in ([] if searched else advice(study))), *runs.notes),
         duty=duty_answer(study, runs, confirmed),
         cost=clock.total() | {"turns": turns + simulations.turns},
     )
-
-
-def _failures(*steps: Runs | Adaptive | Robust | Selection | None) -> tuple[Failure, ...]:
-    """Runs that failed in these steps."""
-    return tuple(failure for step in steps if step for failure in step.failures)
-
-
-def _surfaces_and_front(study: Problem, runs: Runs, clock: "_Clock") -> tuple[Problem, ParetoFront]:
-    study = study.with_surfaces(with_rivals(fit_surfaces(study, runs)))
-    clock.lap("fit_s")
-    front = find_front(study)
-    clock.lap("front_s")
-    return study, front
 
 
 def _searched(

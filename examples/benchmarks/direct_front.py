@@ -36,8 +36,7 @@ from doe.workflow.effort import Effort
 from doe.workflow.front import find_front
 from doe.workflow.front_record import EstimatedPoint
 from doe.workflow.problem import Problem
-from doe.workflow.replication import standard_errors
-from doe.workflow.runs import run_design
+from doe.workflow.runs import run_design, standard_errors
 from doe.workflow.surfaces import fit_surfaces
 from rbdyn.base.arrays import Array
 from rbdyn.base.command import progress_bar

@@ -18,7 +18,7 @@ from doe.study_file.sections import Robust
 from doe.workflow.input_sets import ROUND_SEEDS, override_notes, read_case, replicated_sets, run
 from doe.workflow.judgement import MOST_PAIRS, Decision, Pair, worded
 from doe.workflow.problem import Problem
-from doe.workflow.robust import check_robust, fresh_rows, judge
+from doe.workflow.robust import case_of_study, fresh_rows, judge
 from doe.workflow.status import CODE, inputs_digest
 from doe.workflow.uncertainty import OUTPUTS, find_uncertainty
 from rbdyn.base.digests import code_behind
@@ -482,7 +482,7 @@ def test_a_study_says_where_input_sets_differ_from_its_runs(judgement: tuple[Pro
 def test_a_factor_cannot_be_unknown_too(tmp_path: Path) -> None:
     law = '[uncertain]\n"cage.pocket_clearance_mm" = { law = "uniform", low = 0.2, high = 0.4 }\n'
     with pytest.raises(InputError, match="is a factor of the study too"):
-        check_robust(_study(tmp_path, law))
+        case_of_study(_study(tmp_path, law))
 
 
 def test_what_varies_cannot_be_measured(tmp_path: Path) -> None:

@@ -94,7 +94,7 @@ def test_literature_the_flight_has_its_points_and_its_life():
     assert study.shares == {"cruise": 0.8, "idle": 0.15, "take-off": 0.05}
     assert read_duty(study.path) == study.file.duty
     assert study.responses[-1] == "idle: cage_slip"
-    life = lives(study, {"baseline": study.baseline})["baseline"]
+    life = lives(study, {"baseline": study.confirmation_run(study.baseline).scenes})["baseline"]
     assert life.hours == pytest.approx(92_024.0, rel=1e-4)
     assert life.damage == pytest.approx((0.001, 0.703, 0.296), abs=0.001)
 

@@ -111,7 +111,7 @@ def clearance() -> dict[str, bool]:
     from doe.clearance import responses_of
     from doe.commands.new import _factors
     from doe.report.sections.answer import MEANINGS
-    from doe.workflow.whole import NAMES
+    from doe.workflow.duty import NAMES
     from rbdyn.clearances import other_ranges
     from rbdyn.cli.simulation_output import CLEARANCE_COLUMNS
 

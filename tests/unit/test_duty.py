@@ -227,7 +227,7 @@ def test_the_optimum_of_the_mean_lies_between_those_of_the_points(tmp_path, monk
     alone = {point.name: point.own.factors[study.factors[place]] for point in outcome.duty.points}
     assert alone == pytest.approx({"idle": 0.34, "cruise": 0.26}, abs=0.006)
     # A hot inner ring takes of the radial clearance.
-    play = {name: point.operating["radial_clearance_mm"] for name, point in outcome.clearances_at_points.items()}
+    play = {point.name: point.operating_clearances_mm["radial_clearance_mm"] for point in outcome.duty.points}
     assert play["idle"]["pick"] < play["cruise"]["pick"] - 0.005
     # The compromise costs 1e4 (0.04 mm)^2 = 16 N of 116 N at either point.
     for point in outcome.duty.points:

@@ -14,12 +14,12 @@ from short_studies import paper_study, short_study
 
 from doe.clearance import FURTHER_SEEDS
 from doe.study_file.sections import OtherLimits
-from doe.workflow import replication, whole
+from doe.workflow import runs as study_runs
+from doe.workflow import whole
 from doe.workflow.confirmation import Choice, confirm, confirmed_from
 from doe.workflow.effort import Effort
 from doe.workflow.problem import Problem, Settings
-from doe.workflow.replication import NOISY, noisy
-from doe.workflow.runs import Runs
+from doe.workflow.runs import NOISY, Runs, noisy
 from doe.workflow.status import study_stages, study_status
 
 EIGHT = "turns=3,discard_turns=1,replicates=8,companion=false,impact_window_turns=1"
@@ -76,11 +76,11 @@ def test_unit_replicates_that_differ_about_a_class_get_the_others(monkeypatch, f
     runs = Runs(
         study.design.coded, study.plan.actual, np.ones((RUNS, 3)), np.zeros((RUNS, 3)), design=study.design
     ).with_cages(parts)
-    monkeypatch.setattr(replication, "run_design", lambda *asked: runs)
-    monkeypatch.setattr(replication, "noisy", lambda *asked: [])
+    monkeypatch.setattr(study_runs, "run_design", lambda *asked: runs)
+    monkeypatch.setattr(study_runs, "noisy", lambda *asked: [])
     others = np.zeros((RUNS, 1))
     others[3] = further
-    monkeypatch.setattr(replication, "other_cages", lambda *asked: others)
+    monkeypatch.setattr(study_runs, "other_cages", lambda *asked: others)
 
     class Further:
         def progress(self, title):
@@ -91,7 +91,7 @@ def test_unit_replicates_that_differ_about_a_class_get_the_others(monkeypatch, f
             return [instant_result(scene) for scene in scenes]
 
     heard = list[str]()
-    judged = replication.run_by_need(study, Further(), None, heard.append)
+    judged = study_runs.run_by_need(study, Further(), None, heard.append)
     assert ran == [RUNS] * open_class
     assert heard == ["4 replicates are too few for limits.cage.verdict: all runs continue to 8"] * open_class
     assert (judged.cages_missed is not None and bool(judged.cages_missed[3])) == missed

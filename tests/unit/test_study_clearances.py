@@ -10,8 +10,9 @@ from instant_runs import instantly
 from short_studies import SHORT, run_study, short_study, silent
 
 from doe.report.files import answer_text, summary
+from doe.workflow.duty import operating_clearances
 from doe.workflow.problem import Problem
-from doe.workflow.whole import check_study, operating_clearances, scenes_of
+from doe.workflow.whole import check_study
 from rbdyn.base.faults import InputError, MethodError
 from rbdyn.properties.catalogue import classes_at
 
@@ -38,7 +39,8 @@ def mounted_study(folder: Path, cage: float = 100.0) -> Problem:
 def test_unit_operating_clearances_of_two_designs(tmp_path):
     """Unit: of every factor that is a clearance what its scene has in operation, and the class of the selected design's radial one."""
     study = mounted_study(tmp_path)
-    scenes = scenes_of(study, study.baseline, study.baseline + np.array([0.0, 0.05, 0.1]))
+    points = {"baseline": study.baseline, "pick": study.baseline + np.array([0.0, 0.05, 0.1])}
+    scenes = {name: study.confirmation_scene(point) for name, point in points.items()}
     found = operating_clearances(study, scenes)
     assert list(found.operating) == ["radial_clearance_mm", "guide_clearance_mm", "pocket_clearance_mm"]
     guide, radial = found.operating["guide_clearance_mm"], found.operating["radial_clearance_mm"]
@@ -68,7 +70,7 @@ def test_unit_a_study_shows_drawn_and_operating_clearances(tmp_path, monkeypatch
 def test_unit_without_a_mounting_there_is_nothing_to_show(tmp_path):
     """Unit: no operating clearances and no class without [mounting]."""
     study = Problem.load(short_study(tmp_path))
-    found = operating_clearances(study, scenes_of(study, study.baseline, study.baseline))
+    found = operating_clearances(study, dict.fromkeys(("baseline", "pick"), study.confirmation_scene(study.baseline)))
     assert found.operating == {} and found.class_sentence == ""
 
 

@@ -20,10 +20,11 @@ from doe.report.files import summary
 from doe.running.store import Failure, Store
 from doe.workflow.calibration import find_calibration, read_question
 from doe.workflow.confirmation import EVERYWHERE, Choice, confirmed_from
+from doe.workflow.duty import operating_clearances
 from doe.workflow.input_sets import read_case
 from doe.workflow.problem import Problem
 from doe.workflow.uncertainty import find_uncertainty, uncertainty_stages
-from doe.workflow.whole import check_study, operating_clearances
+from doe.workflow.whole import check_study
 from rbdyn.base.faults import InputError
 from rbdyn.dynamics import simulate as simulation
 from rbdyn.result import TEMPERATURES, HeatBalance, Quantity, Ranges

@@ -12,8 +12,7 @@ from doe.designs.model import model_terms
 from doe.response_surface import describe, fit, model_matrix
 from doe.response_surface.least_squares import solve
 from doe.response_surface.statistics import fits_of
-from doe.workflow.replication import independent_values, standard_errors
-from doe.workflow.runs import Runs
+from doe.workflow.runs import Runs, independent_values, standard_errors
 from doe.workflow.surfaces import with_rivals
 
 POINTS = central_composite(3).coded

@@ -11,15 +11,7 @@ from doe.report.still import Still
 from doe.report.summary import SENSES, Summary, by_point, change, nearest, share_with_interval
 from doe.workflow.adaptive import Adaptive, FrontComparison, Pull, near_limits, pulls
 from doe.workflow.confirmation import ConfirmedPoint
-from doe.workflow.front_record import (
-    WITHOUT,
-    EstimatedPoint,
-    Point,
-    StatedPoint,
-    SurfaceFront,
-    SurfaceLimit,
-    ToleranceFront,
-)
+from doe.workflow.front_record import WITHOUT, EstimatedPoint, Point, SurfaceFront, SurfaceLimit, ToleranceFront
 from doe.workflow.judgement import ConfirmedGain, GainPoint, RobustFront
 from doe.workflow.problem import Asked, Problem
 from doe.workflow.surfaces import PredictedGain
@@ -207,7 +199,7 @@ def _limits(caption: str, limits: Sequence[SurfaceLimit]) -> Table:
 
 def _stated_point(result: SurfaceFront) -> list[Block]:
     """The point that ``doe front --point`` states, compared with the baseline and the front."""
-    point: StatedPoint | None = result.point
+    point = result.point
     if point is None:
         return []
     size = counted(len(result.front), "point")
