@@ -279,12 +279,13 @@ def attempt_text(text: str, version: str) -> RunOutcome:
     return replace(attempt(Scene.from_dict(json.loads(text))), host=host, pid=pid)
 
 
-def figures(names: Sequence[str], results: Sequence[Simulated]) -> tuple[Array, Array, Whole]:
+def figures(names: Sequence[str], results: Sequence[Simulated | Failure]) -> tuple[Array, Array, Whole]:
     """Values, 95 % statistical half-widths (NaN if unknown) and numbers of independent values (0: unknown) of results.
 
-    Each has the shape (runs, responses). The value of a response that a run does not report is NaN.
+    Each has the shape (runs, responses). The value of a response that a run does not report, or of a failed run, is NaN.
     """
-    table = [[responses.get(name) for name in names] for responses in (result.responses for result in results)]
+    reports = ({} if isinstance(result, Failure) else result.responses for result in results)
+    table = [[responses.get(name) for name in names] for responses in reports]
     values, errors, _, freedom = arrays_of(table)
     # Student's t of a mean of n independent values has n - 1 degrees of freedom.
     return values, errors, np.where(np.isfinite(freedom), freedom + 1.0, 0.0).astype(np.int64)

@@ -68,14 +68,8 @@ class Evaluator:
         labels = [f"{label} {self.done + row}" for row in range(1, len(runs) + 1)]
         results = self._simulations.run(runs, labels, self._watch)
         self.done += len(runs)
-        values = np.full((len(runs), len(self._study.responses)), np.nan)
-        errors, samples = values.copy(), np.zeros(values.shape, dtype=np.int64)
-        for row, result in enumerate(results):
-            if isinstance(result, Failure):
-                self.failures.append(result)
-            else:
-                (values[row],), (errors[row],), (samples[row],) = clearance.figures(self._study.responses, [result])
-        return values, errors, samples
+        self.failures += [result for result in results if isinstance(result, Failure)]
+        return clearance.figures(self._study.responses, results)
 
     def _watch(self, count: int, total: int) -> None:
         points = max(len(self._study.shares), 1)
@@ -88,7 +82,7 @@ class Evaluator:
         self._progress = self._simulations.progress(words)
 
     def __call__(self, points: Array, replicates: Whole) -> tuple[Array, Array, Whole]:
-        """Responses (n, m), their standard errors (n, m) and the degrees of freedom (n, m) of these."""
+        """Responses (n, m), their standard errors (n, m) and the degrees of freedom (n, m) of these; NaN for a failed run."""
         # Points at the resolution of the drawing, whatever their last bits were.
         scenes = []
         for number, (point, count) in enumerate(zip(points, replicates.tolist(), strict=True), self.done):

@@ -71,8 +71,7 @@ def find_front(study: Problem, simulated: Sequence[Confirmed] = (), failed: int 
             pareto = _backed_off(study, plain, doubt, failed)
         except InfeasibleError:
             # Before any point is simulated nothing is expected but the surfaces.
-            errors = doubt.about_expected(0.0) if simulated else doubt.at_share(0.0)
-            pareto = replace(plain(errors, closest=True), pick_reason=CLOSEST)
+            pareto = replace(plain(doubt.at_share(0.0, doubt.corrected), closest=True), pick_reason=CLOSEST)
     pareto = replace(pareto, uncertainty=_uncertainty(study, pareto))
     if box is None or pareto.violations is not None:
         return pareto
@@ -108,16 +107,16 @@ def _backed_off(study: Problem, search: Callable[[Doubt], AnyFront], doubt: "Sur
     if not study.goals.limited:
         return search(doubt.at_share(0.0))
     shares = (1.0 + failed, *SHARES)[failed == 0 :]
-    ways = [(doubt.at_share, ""), (doubt.about_expected, ", corrected by the simulated points")][: 1 + doubt.corrected]
     faults = []
-    for (errors, source), share in product(ways, shares):
+    for expected, share in product((False, True)[: 1 + doubt.corrected], shares):
         try:
-            searched = search(errors(share))
+            searched = search(doubt.at_share(share, expected))
         except InfeasibleError as fault:
             faults.append(fault)
             continue
         margin = "the margin" if share >= 1.0 else f"{100.0 * share:g} % of the margin"
         words = f"; limits keep {margin} for the required probability of {study.file.confirmation.limit_probability:g}"
+        source = ", corrected by the simulated points" if expected else ""
         return replace(searched, pick_reason=searched.pick_reason + words + source)
     raise faults[-1]
 
@@ -248,11 +247,11 @@ class Misses(NamedTuple):
 
 
 class ErrorField:
-    """The error of a prediction as a Gaussian field, conditioned on its misses."""
+    """The error of a prediction as a Gaussian field, conditioned on its misses; ``more``: the standard error of one more simulation, which counts too."""
 
-    def __init__(self, misses: Misses) -> None:
+    def __init__(self, misses: Misses, more: float = 0.0) -> None:
         prior = correlation(misses.points, misses.points) * np.outer(misses.forecast_errors, misses.forecast_errors)
-        self._misses, self._noise = misses, np.diag(misses.errors**2)
+        self._misses, self._noise, self._more = misses, np.diag(misses.errors**2), more
         self._scale = _scale(prior, self._noise, misses.misses)
         self._solve = np.linalg.pinv(self._scale**2 * prior + self._noise, hermitian=True)
 
@@ -265,7 +264,7 @@ class ErrorField:
         )
         projected = link @ self._solve
         variance = (self._scale * forecast_errors) ** 2 - (projected * link).sum(axis=1)
-        return projected @ self._misses.misses, np.sqrt(variance.clip(0.0))
+        return projected @ self._misses.misses, np.hypot(np.sqrt(variance.clip(0.0)), self._more)
 
 
 class SurfaceDoubt:
@@ -276,41 +275,33 @@ class SurfaceDoubt:
         self._fields: dict[int, ErrorField] = {}
         # Points outside the design's runs are known.
         self.corrected = bool(simulated)
-        # The error of one more simulation counts too.
-        self._more: dict[int, float] = {}
         for index in sorted({index for index, _, _ in study.goals.limited}):
             surface = study.surfaces[index]
-            all_misses = _at_design(surface)
+            all_misses, error = _at_design(surface), 0.0
             if simulated:
                 coded = study.coded(np.array([point.point for point in simulated]))
                 errors = standard_errors_of(simulated)[:, index]
                 misses = np.array([point.values[index] for point in simulated]) - surface.predict(coded)
                 more = Misses(coded, misses, errors, surface.prediction_standard_error(coded))
-                all_misses = all_misses.joined(more)
-                self._more[index] = float(errors.max())
-            self._fields[index] = ErrorField(all_misses)
+                all_misses, error = all_misses.joined(more), float(errors.max())
+            self._fields[index] = ErrorField(all_misses, error)
 
     def _off(self, index: int, coded: Array) -> tuple[Array, Array]:
         """Mean (n,) and standard deviation (n,) of a response less its surface."""
-        shift, deviation = self._fields[index](coded, self._surfaces[index].prediction_standard_error(coded))
-        return shift, np.hypot(deviation, self._more.get(index, 0.0))
+        return self._fields[index](coded, self._surfaces[index].prediction_standard_error(coded))
 
-    def at_share(self, share: float) -> Doubt:
-        """Range in which the responses lie with the study's probability, or a share of it."""
+    def at_share(self, share: float, expected: bool = False) -> Doubt:
+        """Range in which the responses lie with the study's probability, or a share of it.
+
+        About the ``expected`` responses it may keep a limit that the surface exceeds.
+        """
 
         def doubt(coded: Array) -> tuple[Array, Array]:
             shift, margin = self._shift_and_margin(coded)
+            if expected:
+                return share * margin - shift, share * margin + shift
             # The back-off never loosens a limit: the surface itself keeps it too.
             return share * (margin - shift).clip(0.0), share * (margin + shift).clip(0.0)
-
-        return doubt
-
-    def about_expected(self, share: float) -> Doubt:
-        """The same about the expected responses, which may keep a limit that the surface exceeds."""
-
-        def doubt(coded: Array) -> tuple[Array, Array]:
-            shift, margin = self._shift_and_margin(coded)
-            return share * margin - shift, share * margin + shift
 
         return doubt
 

@@ -121,10 +121,10 @@ def _doubt(study: Problem, searched: Adaptive, coded: Array, simulated: Sequence
     values, errors = np.array([confirmed.values for confirmed in simulated]), standard_errors_of(simulated)
     for index in range(values.shape[1]):
         misses = values[:, index] - front.values[rows, index]
-        field = ErrorField(Misses(coded[rows], misses, errors[:, index], deviation[rows, index]))
-        shift[:, index], spread = field(coded, front.standard_errors[:, index])
-        # The error of one more simulation counts too.
-        deviation[:, index] = np.hypot(spread, errors[:, index].max())
+        error_field = ErrorField(
+            Misses(coded[rows], misses, errors[:, index], deviation[rows, index]), errors[:, index].max()
+        )
+        shift[:, index], deviation[:, index] = error_field(coded, front.standard_errors[:, index])
     return shift, deviation
 
 

@@ -179,10 +179,13 @@ def reference_runs(study: Problem) -> Runs | None:
 
 
 def compare_with_published(study: Problem, ours: Runs, theirs: Runs) -> dict[str, PublishedComparison]:
-    """Each response of both tables by name, with the linear effects on the surfaces through each table."""
+    """Each response of both tables by name, with the linear effects on the surfaces through each table.
+
+    A published table has no run added in place of a failed one.
+    """
     columns = np.flatnonzero(np.isfinite(theirs.values).any(axis=0))
     study = study.with_responses([study.responses[column] for column in columns])
-    ours, theirs = (_of_columns(runs, columns) for runs in (ours, theirs))
+    ours, theirs = (_of_columns(runs, columns) for runs in (ours.only(list(range(len(theirs.coded)))), theirs))
     assert study.file.reference is not None
     surfaces = zip(fit_surfaces(study, ours), fit_surfaces(study, theirs), strict=True)
     lettered = dict(zip(study.factors, ascii_uppercase, strict=False))

@@ -130,8 +130,8 @@ def check_study(study: Problem, adaptive: bool = False, robust: bool = False) ->
 class StudyResult:
     """Everything a report needs.
 
-    ``inputs``: digest of the study, its files and the code. ``confirmed`` and ``gains`` are by name of the point,
-    "baseline" (without gains) and "pick" first. ``tries``: points simulated as the pick until one kept its limits.
+    ``inputs``: digest of the study, its files and the code. ``confirmed`` is by name of the point,
+    "baseline" and "pick" first. ``tries``: points simulated as the pick until one kept its limits.
 
     ``tolerances`` is None if the study asks for none. ``adaptive``, ``searched_pick`` and ``front_comparison`` are None
     without the adaptive search, ``robust`` without the robust judgement, ``duty`` without a duty.
@@ -149,7 +149,6 @@ class StudyResult:
     edge: Edge
     tries: int
     confirmed: Mapping[str, confirmation.Confirmed]
-    gains: Mapping[str, dict[str, confirmation.Gain]]
     tolerances: PickTolerances | None
     chains: Mapping[str, ChainResult]
     published_comparisons: dict[str, PublishedComparison]
@@ -168,6 +167,12 @@ class StudyResult:
     def pick(self) -> confirmation.Confirmed:
         """The chosen design, simulated."""
         return self.confirmed["pick"]
+
+    @cached_property
+    def gains(self) -> dict[str, dict[str, confirmation.Gain]]:
+        """Simulated gains over the baseline, by name of the point and by response."""
+        points = {name: point for name, point in self.confirmed.items() if name != "baseline"}
+        return {name: confirmation.gains(self.study, self.baseline, point) for name, point in points.items()}
 
     @cached_property
     def scenes(self) -> dict[str, Scene]:
@@ -313,10 +318,9 @@ def run_study(
         edge=edge,
         tries=selection.tries,
         confirmed=confirmed,
-        gains=_gains(study, confirmed),
         tolerances=tolerances,
         chains=chains,
-        published_comparisons={} if reference is None else _compared(study, runs, reference),
+        published_comparisons={} if reference is None else compare_with_published(study, runs, reference),
         reference_values=None if reference is None else reference.values,
         failures=tuple(failure for step in steps if step for failure in step.failures),
         notes=(*notes, *(Note("advice", text) for text in ([] if searched else advice(study))), *runs.notes),
@@ -356,19 +360,6 @@ def _tolerances(
         draws = draws_about(study, searched, neighbours, pick, confirmed["baseline"])
         parts = replace(parts, neighbours=neighbours, search_draws=draws)
     return parts.widest()
-
-
-def _compared(study: Problem, runs: Runs, reference: Runs) -> dict[str, PublishedComparison]:
-    """The runs compared with those of the published table, which has no run added in place of a failed one."""
-    return compare_with_published(study, runs.only(list(range(len(reference.coded)))), reference)
-
-
-def _gains(study: Problem, confirmed: Mapping[str, confirmation.Confirmed]) -> dict[str, dict[str, confirmation.Gain]]:
-    return {
-        name: confirmation.gains(study, confirmed["baseline"], point)
-        for name, point in confirmed.items()
-        if name != "baseline"
-    }
 
 
 class _Clock:
