@@ -397,14 +397,18 @@ class DutyResult(Record):
 
 
 Simulated = SimulationResult | DutyResult
-# Key of a verdict without a duty.
+# Key of the only scene and result without a duty.
 OPERATION = "operation"
+
+
+def results_at(result: Simulated) -> Mapping[str, SimulationResult]:
+    """Results by point of the duty, or under OPERATION."""
+    return result.points if isinstance(result, DutyResult) else {OPERATION: result}
 
 
 def cages_of(result: Simulated) -> dict[str, CageVerdict]:
     """Verdict on the cage by point of the duty, or under OPERATION; empty where its scene leaves it out."""
-    results = result.points if isinstance(result, DutyResult) else {OPERATION: result}
-    return {name: run.verdict for name, run in results.items() if run.verdict is not None}
+    return {name: run.verdict for name, run in results_at(result).items() if run.verdict is not None}
 
 
 def result_of(

@@ -318,4 +318,4 @@ def command() -> Callable[..., subprocess.CompletedProcess[str]]:
 @pytest.fixture(autouse=True)
 def untried_cages(monkeypatch: pytest.MonkeyPatch) -> None:
     """``doe new`` within this process runs no scene for the class of its cage, which takes seconds; its own tests replace that."""
-    monkeypatch.setattr("doe.workflow.short_runs.baseline_cages", lambda *study: {})
+    monkeypatch.setattr("doe.workflow.region.baseline_cages", lambda *study: {})

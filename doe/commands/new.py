@@ -103,7 +103,7 @@ def new(
     """Create a commented study file for the clearances of a scene file."""
     with command.guarded(as_json):
         from doe.study_file.study import StudyFile
-        from doe.workflow import front, problem, region, short_runs, whole
+        from doe.workflow import front, problem, region, whole
         from doe.workflow.confirmation import WHIRL
         from doe.workflow.effort import Effort
         from rbdyn.base.faults import read_toml, validated
@@ -117,7 +117,7 @@ def new(
         factors = _factors(read_toml(path))
         values = {"quoted": _quoted_path(path, out), "hours": "true" if hours else None}
 
-        def written(factors: list[Factor], discarded: int = short_runs.DISCARDED) -> tuple[str, problem.Problem]:
+        def written(factors: list[Factor], discarded: int = region.DISCARDED) -> tuple[str, problem.Problem]:
             parts = _sections(scene, factors, tolerances, chains)
             text = _filled(parts | sections, values | _numerics(scene, discarded))
             file = validated(StudyFile, tomllib.loads(text), f"study of {path}")
@@ -131,13 +131,14 @@ def new(
             if moved is not study:
                 sections["baseline"], factors = _baseline(moved), _moved(factors, study, moved)
                 text, study = written(factors)
-            cages = short_runs.baseline_cages(study, folder, effort)
+            whole.check_study(study)
+            cages = region.baseline_cages(study, folder, effort)
             if {cage.name for cage in cages.values()} == {"held"}:
-                sections["responses"] = HELD + _responses(limits, {WHIRL: short_runs.IMPACT_POWER}) + class_limit
+                sections["responses"] = HELD + _responses(limits, {WHIRL: region.IMPACT_POWER}) + class_limit
                 text, study = written(factors)
-            if cages and len(slow := short_runs.slow_points(study, folder, effort)) < len(cages):
+            if cages and len(slow := region.slow_points(study, folder, effort)) < len(cages):
                 sections["duty"] = duty_text(points, hours, slow)
-                text, study = written(factors, short_runs.FEWER)
+                text, study = written(factors, region.FEWER)
         whole.check_study(study)
         command.hand_out(text, as_json, out, force, "doe study", reads)
 
@@ -152,7 +153,7 @@ def _numerics(scene: "Scene", discarded: int) -> dict[str, str | None]:
 
     That is looser unless the scene has its own or may run implicitly. Confirmations keep the default of both.
     """
-    from doe.workflow.short_runs import DISCARDED
+    from doe.workflow.region import DISCARDED
 
     looser, kept = "", [f"numerics.discard_turns={DISCARDED}"] * (discarded != DISCARDED)
     if scene.traction.elasticity and "rtol" not in scene.numerics.model_fields_set:
@@ -290,7 +291,7 @@ def _quoted(value: str | list[str]) -> str:
 
 def duty_text(points: "Sequence[DutyPoint]", hours: bool, slow: Sequence[str] = ()) -> str:
     """The [[duty]] tables of a study; ``hours``: whether shares are hours; ``slow``: points that discard more turns than the others."""
-    from doe.workflow.short_runs import DISCARDED
+    from doe.workflow.region import DISCARDED
 
     unit, more = "h" if hours else "of the time", [f"numerics.discard_turns={DISCARDED}"]
     return "\n".join(

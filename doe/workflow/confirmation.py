@@ -11,7 +11,7 @@ from typing import Literal
 import numpy as np
 
 from doe.clearance import Simulations
-from doe.duty import DutyResult, Run, Simulated, cages_of
+from doe.duty import OPERATION, DutyResult, Run, Simulated, cages_of, results_at
 from doe.running.store import Failure
 from doe.unknown.propagation import Share
 from doe.workflow.problem import Problem
@@ -28,8 +28,6 @@ from rbdyn.scene import Scene
 from rbdyn.scene.thermal import simulated_scene
 from rbdyn.verdict.orbits import CageVerdict
 
-# Key of the only scene of a study without a duty.
-EVERYWHERE = ""
 WHIRL = "whirl_deviation_ratio"
 # Beginning of the names of points that were simulated as the pick.
 TRY = "try_"
@@ -81,17 +79,14 @@ class Confirmed(Record):
 
     @property
     def hot(self) -> dict[str, Scene]:
-        """Scenes at the temperatures of their runs by point of the duty, or under EVERYWHERE; empty without a heat balance."""
-        result = self.result
-        results = result.points if isinstance(result, DutyResult) else {EVERYWHERE: result}
-        return {
-            name: simulated_scene(run) for name, run in results.items() if run is not None and run.thermal is not None
-        }
+        """Scenes at the temperatures of their runs by point of the duty, or under OPERATION; empty without a heat balance."""
+        results = {} if self.result is None else results_at(self.result)
+        return {name: simulated_scene(run) for name, run in results.items() if run.thermal is not None}
 
     def scenes(self, study: Problem) -> dict[str, Scene]:
-        """Scenes of its runs by point of the duty, or under EVERYWHERE; with a heat balance at the temperatures of these runs."""
+        """Scenes of its runs by point of the duty, or under OPERATION; with a heat balance at the temperatures of these runs."""
         run = study.confirmation_run(self.point)
-        return ({EVERYWHERE: run} if isinstance(run, Scene) else dict(run.scenes)) | self.hot
+        return ({OPERATION: run} if isinstance(run, Scene) else dict(run.scenes)) | self.hot
 
     @property
     def cages(self) -> dict[str, CageVerdict]:

@@ -6,6 +6,8 @@ says so. The file of the study stays as it is; its runs, fits and picks have the
 With stated temperatures nothing is simulated. With a heat balance short runs of the centre give the temperatures of all points. Where
 these leave few kelvin anywhere, the corner with the least clearances is balanced too, for a land or a pocket that closes heats
 itself: it takes more than at the centre, and may close altogether.
+
+Short runs of the baseline tell, before its study is written, the class of its cage and the turns that runs need to discard.
 """
 
 import math
@@ -17,7 +19,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from doe import clearance
-from doe.duty import Simulated
+from doe.duty import OPERATION, DutyScenes, Run, Simulated, cages_of, main_scene, results_at, scene_at, scenes_of
 from doe.running.store import Failure
 from doe.study_file.sections import Factor
 from doe.workflow.effort import Effort
@@ -26,11 +28,13 @@ from rbdyn.base.arrays import Array
 from rbdyn.base.faults import InputError, RunError, refuse
 from rbdyn.base.notes import Note
 from rbdyn.base.words import all_of, counted, quantity
+from rbdyn.dynamics.figures import why_missing
 from rbdyn.mounting.cage import NEARLY_K, RunningClearance
-from rbdyn.result import SimulationResult
+from rbdyn.result import Quantity, SimulationResult
 from rbdyn.scene import DrawnScene, Scene
 from rbdyn.scene.lubricant import HOTTEST_C
-from rbdyn.scene.thermal import Near, Temperatures, begun_near, ceilings, near_of, part_temperatures
+from rbdyn.scene.thermal import Near, Temperatures, at_temperatures, begun_near, ceilings, near_of, part_temperatures
+from rbdyn.verdict.orbits import CageVerdict
 
 # Share of its width that a stated region keeps at least: it is narrowed that far, and moves beyond.
 KEPT = 0.5
@@ -53,6 +57,16 @@ FEW_K = 30.0
 HOTTER_K = 10.0
 # Times that the region is looked at: it moves for its centre, then for its corner.
 MOST_LOOKS = 8
+IMPACT_POWER = "pocket_impact_power_W"
+# Turns that design runs discard, and those that they discard where a bearing forgets its start as fast as most do.
+DISCARDED, FEWER = 20, 7
+# Settings of short runs of the baseline beside what the study's runs set: of one as it is, whose replicates are as few as name a
+# class of the cage, and of one that counts the turns between. Impacts have windows that fit both.
+SHORT_RUN = ("numerics.extend=false", "numerics.impact_window_turns=4")
+BETWEEN = (*SHORT_RUN, f"numerics.discard_turns={FEWER}", f"numerics.turns={(DISCARDED - FEWER) // 4 * 4}")
+# Largest bias by fewer turns, over the error of six replicates: half of the error of the four of a design run; and over the figure,
+# up to which it decides nothing.
+SLIGHT_BIAS, NEGLIGIBLE_BIAS = 0.75, 1e-3
 
 # Results of short runs of scenes with these labels.
 Balances = Callable[[Sequence[Scene], Sequence[str]], Sequence[Simulated | Failure]]
@@ -458,3 +472,70 @@ def _replaced(seized: Sequence[tuple[RunningClearance, str]], design: str) -> st
     return (
         f"Seizure: {words} of {design} in operation is {left}{heats}; gains are over the middle of the region instead."
     )
+
+
+def baseline_cages(study: Problem, folder: Path, effort: Effort) -> dict[str, CageVerdict]:
+    """Class of the cage at the baseline by point of the duty, by a short run; empty where none traces it, or the run fails."""
+    run = _short_run(study, SHORT_RUN)
+    if any(scene.cage_sample_s is None or why_missing(scene, IMPACT_POWER) for scene in scenes_of(run)):
+        return {}
+    result = _baseline_result(study, run, "the class of the cage", folder, effort)
+    return {} if isinstance(result, Failure) else cages_of(result)
+
+
+def slow_points(study: Problem, folder: Path, effort: Effort) -> list[str]:
+    """Points of the duty, or OPERATION, where fewer discarded turns bias a response with a goal, by short runs of the baseline.
+
+    They are all points where a run fails. A heat balance is made once: the turns between are at its temperatures.
+    """
+    usual = _baseline_result(study, _short_run(study, SHORT_RUN), "", folder, effort)
+    if not isinstance(usual, Failure):
+        between = _at_temperatures_of(usual, _short_run(study, BETWEEN, more=2))
+        early = _baseline_result(study, between, "the turns to discard", folder, effort)
+        if not isinstance(early, Failure):
+            names, sooner = [study.responses[place] for place in study.goals.objectives], results_at(early)
+            turns = main_scene(study.usual_run).numerics.turns
+            return [
+                point
+                for point, found in results_at(usual).items()
+                if any(_biased(found.responses[name], sooner[point].responses[name], turns) for name in names)
+            ]
+    return [*study.shares] or [OPERATION]
+
+
+def _biased(figure: Quantity, early: Quantity, turns: float) -> bool:
+    """Whether a run that counts the ``early`` figure too, of so many turns, is biased by much of its error."""
+    bias = (DISCARDED - FEWER) / turns * abs(early.value - figure.value)
+    return bias > max(SLIGHT_BIAS * (figure.statistical_error or 0.0), NEGLIGIBLE_BIAS * abs(figure.value))
+
+
+def _at_temperatures_of(result: Simulated, run: Run) -> Run:
+    """The run at the temperatures that the heat balances of a result have."""
+    hot = {
+        name: at_temperatures(scene_at(run, name), Temperatures(**{node: it.value for node, it in nodes.items()}))
+        for name, found in results_at(result).items()
+        if (nodes := found.temperatures_C) is not None
+    }
+    return replace(run, scenes={**run.scenes, **hot}) if isinstance(run, DutyScenes) else hot.get(OPERATION, run)
+
+
+def _short_run(study: Problem, settings: Sequence[str], more: int = 1) -> Run:
+    """A run of the baseline with as few replicates as name a class of the cage, or ``more`` times as many."""
+
+    def scene(sets: Sequence[str]) -> Scene:
+        bare = study.scene_at(study.baseline, study.file.design.seed, sets, confirms=True)
+        effort = [f"numerics.replicates={more * bare.verdict.limits.fewest_replicates}", *settings]
+        return study.scene_at(study.baseline, study.file.design.seed, [*sets, *effort], confirms=True)
+
+    return study.over_duty(scene)
+
+
+def _baseline_result(study: Problem, run: Run, purpose: str, folder: Path, effort: Effort) -> Simulated | Failure:
+    """Result of a short run of the baseline; the notice hears of its ``purpose``, if it has one."""
+    if effort.notice is not None and purpose:
+        scenes = scenes_of(run)
+        numerics = scenes[0].numerics
+        turns = numerics.replicates * (numerics.turns + numerics.warm_up_turns)
+        effort.notice(f"{counted(len(scenes), 'short run')} of {turns:g} shaft turns for {purpose}")
+    with effort.simulations(folder, study.path) as simulations:
+        return simulations.run([run], ["baseline"], simulations.progress("baseline"))[0]

@@ -183,12 +183,12 @@ class StudyResult:
     def main_point(self) -> str:
         """The point of the duty that ``scenes`` are at."""
         duty = Duty.of(self.study)
-        return confirmation.EVERYWHERE if duty is None else duty.main
+        return OPERATION if duty is None else duty.main
 
     @property
     def cage_classes(self) -> dict[str, str]:
         """Class of the cage in these scenes; without one where they leave it out."""
-        cages = {name: self.confirmed[name].cages.get(self.main_point or OPERATION) for name in ("baseline", "pick")}
+        cages = {name: self.confirmed[name].cages.get(self.main_point) for name in ("baseline", "pick")}
         return {name: cage.name for name, cage in cages.items() if cage is not None}
 
     @cached_property

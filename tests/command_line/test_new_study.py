@@ -18,7 +18,7 @@ from doe.study_file.sections import StudyChain
 from doe.workflow.effort import Effort
 from doe.workflow.parts import clearance_parts, manufacture_of
 from doe.workflow.problem import Problem
-from doe.workflow.short_runs import baseline_cages, slow_points
+from doe.workflow.region import baseline_cages, slow_points
 from rbdyn.base.faults import InputError
 from rbdyn.base.tables.sheet import listed
 from rbdyn.properties.tolerances import grade_tolerances
@@ -232,8 +232,8 @@ def test_command_line_from_a_drawing_to_parts(scene, tmp_path):
 def test_command_line_goals_follow_the_class_of_the_cage(scene, monkeypatch, classes, goal, words):
     """Command line: impact power instead of the whirl ratio where the cage is held at every point, and a comment; a limit still names it."""
     found = {point: SimpleNamespace(name=name) for point, name in classes.items()}
-    monkeypatch.setattr("doe.workflow.short_runs.baseline_cages", lambda *study: found)
-    monkeypatch.setattr("doe.workflow.short_runs.slow_points", lambda *study: [*found])
+    monkeypatch.setattr("doe.workflow.region.baseline_cages", lambda *study: found)
+    monkeypatch.setattr("doe.workflow.region.slow_points", lambda *study: [*found])
     text, study = written(scene)
     goals = [response["name"] for response in study["response"] if response["goal"] == "min"]
     assert goals == ["impact_force_N", goal, "power_loss_W"]
@@ -245,10 +245,10 @@ def test_command_line_goals_follow_the_class_of_the_cage(scene, monkeypatch, cla
 
 def test_command_line_design_runs_of_a_bearing_that_settles_early_discard_fewer_turns(scene, monkeypatch):
     """Command line: 7 turns instead of 20, but confirmations discard 20; a cage that no short run traces keeps them."""
-    monkeypatch.setattr("doe.workflow.short_runs.slow_points", lambda *study: [])
+    monkeypatch.setattr("doe.workflow.region.slow_points", lambda *study: [])
     _, untraced = written(scene)
     monkeypatch.setattr(
-        "doe.workflow.short_runs.baseline_cages", lambda *study: {"operation": SimpleNamespace(name="circling")}
+        "doe.workflow.region.baseline_cages", lambda *study: {"operation": SimpleNamespace(name="circling")}
     )
     _, early = written(scene)
     for study, turns, kept in ((untraced, 20, []), (early, 7, ["numerics.discard_turns=20"])):
@@ -295,7 +295,7 @@ def test_unit_a_bearing_is_slow_by_its_goals(scene, tmp_path, monkeypatch, name,
             each if isinstance(each, Failure) else SimpleNamespace(responses=each, temperatures_C=None)
             for each in responses
         ]
-        monkeypatch.setattr("doe.workflow.short_runs._baseline_results", lambda *study: [results.pop(0)])
+        monkeypatch.setattr("doe.workflow.region._baseline_result", lambda *study: results.pop(0))
         return slow_points(study, tmp_path, Effort())
 
     assert judged(usual, usual | {name: Quantity(early, 2.0, 0.0, 40.0)}) == slow
@@ -311,10 +311,10 @@ def test_command_line_points_of_a_duty_discard_turns_alone(tmp_path, monkeypatch
         "name,share,operation.inner_speed_rpm\nidle,0.2,6000\ncruise,0.8,20000\n", encoding="utf-8"
     )
     cages = {name: SimpleNamespace(name="circling") for name in ("idle", "cruise")}
-    monkeypatch.setattr("doe.workflow.short_runs.baseline_cages", lambda *study: cages)
+    monkeypatch.setattr("doe.workflow.region.baseline_cages", lambda *study: cages)
     studies = []
     for slow in ([], ["idle"], ["idle", "cruise"]):
-        monkeypatch.setattr("doe.workflow.short_runs.slow_points", lambda *study, slow=slow: slow)
+        monkeypatch.setattr("doe.workflow.region.slow_points", lambda *study, slow=slow: slow)
         _, study = written(EXAMPLES / "cylindrical_roller.toml", "--duty", tmp_path / "duty.csv")
         studies.append((study["scene"]["set"][1], *(point["set"][1:] for point in study["duty"])))
     few, many = "numerics.discard_turns=7", "numerics.discard_turns=20"
@@ -328,9 +328,7 @@ def test_unit_the_turns_between_are_at_the_temperatures_of_a_heat_balance(tmp_pa
     usual = SimpleNamespace(
         responses=dict.fromkeys(study.responses, Quantity(100.0, 2.0, 0.0, 40.0)), temperatures_C=nodes
     )
-    monkeypatch.setattr(
-        "doe.workflow.short_runs._baseline_results", lambda study, runs, *other: asked.extend(runs) or [usual]
-    )
+    monkeypatch.setattr("doe.workflow.region._baseline_result", lambda study, run, *other: asked.append(run) or usual)
     assert slow_points(study, tmp_path, Effort()) == []
     hot, at = asked
     assert hot.thermal is not None and at.thermal is None

@@ -16,10 +16,11 @@ from typer.testing import CliRunner
 from doe import clearance
 from doe.clearance import Simulations
 from doe.cli import app
+from doe.duty import OPERATION
 from doe.report.files import summary
 from doe.running.store import Failure, Store
 from doe.workflow.calibration import find_calibration, read_question
-from doe.workflow.confirmation import EVERYWHERE, Choice, confirmed_from
+from doe.workflow.confirmation import Choice, confirmed_from
 from doe.workflow.duty import operating_clearances
 from doe.workflow.input_sets import read_case
 from doe.workflow.problem import Problem
@@ -136,7 +137,7 @@ def test_unit_a_confirmed_point_is_hot(tmp_path):
     scene = study.confirmation_scene(study.baseline)
     confirmed = confirmed_from(study, Choice(study.baseline, ""), hot_result(scene))
     assert confirmed.values[-1] == 93.0 and confirmed.result.thermal.ranges.figures["inner"] == (88.0, 93.0, 108.0)
-    hot = confirmed.hot[EVERYWHERE]
+    hot = confirmed.hot[OPERATION]
     assert hot.thermal is None and hot.mounting.inner_ring_temperature_C == 93.0 and hot.lubricant.temperature_C == 92.7
     found = operating_clearances(study, {"baseline": hot, "pick": hot}).operating
     assert found["guide_clearance_mm"]["pick"] == pytest.approx(0.1204, abs=2e-4)
