@@ -97,9 +97,9 @@ class RunsAnswer(Answer):
     @property
     def causes(self) -> "Sheet[Cause]":
         """A row a cause of failures."""
-        from doe.workflow.scene_table import causes_of
+        from doe.running.store import grouped
 
-        return Sheet("Rows that failed", CAUSES, causes_of(self.runs))
+        return Sheet("Rows that failed", CAUSES, grouped(run.failure for run in self.runs if run.figures is None))
 
     @property
     def spans(self) -> Sheet[Span]:

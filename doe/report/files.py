@@ -248,18 +248,14 @@ def confirmation_sheet(
         *Column[Row]("{}", unit="of the response", meaning=mean).of(["value", "statistical_error", "numerical_error"]),
         Column("improvement_percent", at=("gain", "percent"), meaning=its_gain),
         Column("improvement_error_percent", at=("gain", "error_percent")),
-        Column(
-            "verdict",
-            at=lambda row: row["gain"].verdict if row["gain"] else "",
-            meaning="better, worse or within error",
-        ),
+        Column("verdict", at=("gain", "verdict"), meaning="better, worse or within error"),
         Column("joint_error", unit="of the response", meaning="half width of both errors together"),
         Column(
             "limit",
             at=lambda row: f"{row['judged'].sense} {row['judged'].bound:g}" if row["judged"] else "",
             meaning="the limit, and kept (met), broken (violated) or undecided",
         ),
-        Column("limit_verdict", at=lambda row: row["judged"].verdict if row["judged"] else ""),
+        Column("limit_verdict", at=("judged", "verdict")),
     )
     content = "One row per response of each point that was simulated again."
     return Sheet("", columns, rows, file="confirmation.csv", content=content)

@@ -68,7 +68,7 @@ def title(summary: Summary) -> str:
 def sections(summary: Summary, motion: Motions = MappingProxyType({})) -> list[Section]:
     """Sections with something to say."""
     chapters = [
-        answer.answer(summary),
+        Section("answer", "The answer", answer.first_screen(summary)),
         identity_section(summary.identity),
         duty.duty(summary),
         answer.settings(summary),

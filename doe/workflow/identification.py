@@ -204,7 +204,8 @@ def identified(evidence: Evidence) -> Calibration:
         gained = _learnt(evidence)
         contradictions += objections(judgement, has_learned=gained.has_learned, emulated=match.misfit < MISSED)
         after = match.cells.mean(evidence.quantiles)
-        notes = (*notes, *map(_narrow, gained.narrow))
+        narrow = "the posterior lies at an end of its range, which may be too narrow"
+        notes = (*notes, *(Note("inputs", f"{key}: {narrow}") for key in gained.narrow))
         taus = np.quantile(match.errors(evidence.points).level, MEDIAN_FIRST, axis=0).T.tolist()
         discrepancy = dict(zip(rig.outputs, taus, strict=False))
     cells = [_cell(evidence, place, judgement, after) for place in range(len(evidence.cells))]
@@ -241,10 +242,6 @@ def _refuted(evidence: Evidence) -> list[str]:
     names = ", ".join(f"{quantity(name)[0]} of row {row}" for row, name in cells)
     sentence = "refuted: no input set within the laws predicts these within the allowed discrepancy"
     return [f"{sentence}: {names}"] if cells else []
-
-
-def _narrow(key: str) -> Note:
-    return Note("inputs", f"{key}: the posterior lies at an end of its range, which may be too narrow")
 
 
 def _learnt(evidence: Evidence) -> Learnt:

@@ -19,7 +19,7 @@ import numpy as np
 
 from doe.clearance import Simulations, work_of
 from doe.running.runner import Progress, Stage
-from doe.running.store import Cause, Failure, grouped
+from doe.running.store import Failure
 from doe.study_file.table import DONE, FAILED, STATUS
 from rbdyn.base.arrays import Array
 from rbdyn.base.faults import LONGEST_NAME, InputError, key_path, one_line, put_key, read_toml, refuse, set_key
@@ -185,10 +185,6 @@ class RowFigures(Record):
     names: tuple[str, ...]
     numbers: Array
 
-    def numbers_of(self, kind: int) -> dict[str, float | None]:
-        """Numbers of a kind by name of the figure."""
-        return dict(zip(self.names, map(finite, self.numbers[kind].tolist()), strict=True))
-
 
 class RowRun(Record):
     """A row with the figures of its run and the dangers that it found, or with the ``cause`` of its failure."""
@@ -234,17 +230,10 @@ class RowRun(Record):
         record: dict[str, Any] = {"row": self.row.number, "name": self.row.name, "status": self.status}
         record |= {"keys": dict(self.row.values), "dangers": [str(note) for note in self.dangers]}
         if self.figures is not None:
-            values, statistical, numerical = (self.figures.numbers_of(kind) for kind in range(3))
-            record["figures"] = {
-                name: {"value": value, "statistical_error": statistical[name], "numerical_error": numerical[name]}
-                for name, value in values.items()
-            }
+            kinds = ("value", "statistical_error", "numerical_error")
+            rows = zip(self.figures.names, self.figures.numbers.T.tolist(), strict=True)
+            record["figures"] = {name: dict(zip(kinds, map(finite, numbers), strict=True)) for name, numbers in rows}
         return record
-
-
-def causes_of(runs: Sequence[RowRun]) -> list[Cause]:
-    """Failures of rows by cause, the most frequent first."""
-    return grouped(run.failure for run in runs if run.figures is None)
 
 
 def table_digest(table: SceneTable) -> str:

@@ -200,7 +200,8 @@ class PickTolerances(Record, eq=False):
         """Parts of too fine a grade, what demands them, and what letting that go would give; empty if there are none."""
         at_rim = dict(zip(self.factors, self.widest.at_rim.tolist(), strict=True))
         rim, fine = ([name for name in self.too_fine if at_rim[name] is side] for side in (True, False))
-        grade, cause, sentences = f"IT{self.settings.finest_grade}", _requirement(self.widest.limited_by), list[str]()
+        grade, limit, sentences = f"IT{self.settings.finest_grade}", self.widest.limited_by, list[str]()
+        cause = f"{'Keeping' if limit.startswith(GAIN) else 'Meeting'} {_limit_words(limit)}"
         if fine and not self.any_width:
             sentences.append(f"{cause} leaves no tolerance.")
         elif fine:
@@ -245,11 +246,6 @@ def _limit_words(limit: str) -> str:
         return GAIN + quantity(limit.removeprefix(GAIN))[0]
     name, _, bound = limit.partition(" ")
     return limit if limit == RIM else f"the limit {' '.join((quantity(name)[0], bound, quantity(name)[1]))}".rstrip()
-
-
-def _requirement(limit: str) -> str:
-    """What parts have to do for the gain or the limit that limits the tolerances."""
-    return f"{'Keeping' if limit.startswith(GAIN) else 'Meeting'} {_limit_words(limit)}"
 
 
 def _none(widest: WidestTolerances) -> WidestTolerances:

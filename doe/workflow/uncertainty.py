@@ -1,6 +1,6 @@
 """Ranges of a scene's outputs over its unknown inputs, and the share of each input: ``doe uncertainty``."""
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -134,8 +134,10 @@ def find_uncertainty(
     ]
     covered_places = {place for _, emulator in fitted for place in emulator.columns.tolist()}
     outside_shares = input_sets.shares_outside(case, covered_places, sets.quantiles, sets.signals)
+    still = "in every input set, because no unknown input changes it"
+    idle_notes = [Note("remark", f"{name}: it is {value:.5g} {still}") for name, value in idle.items()]
     notes = _notes(
-        [*_idle_notes(idle), *case.notes, *override_notes(case, overrides, "the run at the scene's own inputs")],
+        [*idle_notes, *case.notes, *override_notes(case, overrides, "the run at the scene's own inputs")],
         sets,
         outputs,
         count,
@@ -174,13 +176,6 @@ def _varying(case: Case, sets: Sets, idle: dict[str, float]) -> tuple[Case, Sets
     idle |= {name: float(values[0, place]) for place, name in enumerate(case.outputs) if not varies[place]}
     names = tuple(name for name, varying in zip(case.outputs, varies, strict=True) if varying)
     return replace(case, outputs=names), replace(sets, outputs=sets.outputs.at((slice(None), varies)))
-
-
-def _idle_notes(idle: Mapping[str, float]) -> list[Note]:
-    return [
-        Note("remark", f"{name}: it is {value:.5g} in every input set, because no unknown input changes it")
-        for name, value in idle.items()
-    ]
 
 
 def _emulated(case: Case, sets: Sets, nominal: Simulated, place: int) -> tuple[propagation.Runs, propagation.Emulated]:

@@ -52,11 +52,6 @@ SENTENCE_END = re.compile(r"(?<=\.) (?=[A-Z])")
 LIMITS_NOTE = "A limit is met or violated if the value is on that side of it by more than its error, otherwise undecided. The probability of meeting it follows from that error."
 
 
-def answer(summary: Summary) -> Section:
-    """What an engineer acts on, in the order of a first screen."""
-    return Section("answer", "The answer", first_screen(summary))
-
-
 def first_screen(summary: Summary) -> list[Block]:
     """Bearing, point and date, the chosen clearances, the verdicts on limits, the gains, the parts to make, and why this point.
 

@@ -1,11 +1,11 @@
 """Unknown inputs: their effect on the figures of a scene (``doe uncertainty``) and on the pick of a study (``--robust``)."""
 
-import csv
 from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from doe.report.sections.calibration import write_sample
 from doe.report.summary import SENSES, Summary
 from doe.unknown.propagation import SHARE_LEVEL, Share
 from doe.workflow.judgement import Decider, Robust
@@ -13,7 +13,6 @@ from doe.workflow.uncertainty import OutputRange, Uncertainty
 from rbdyn.base.blocks import Block, Bullets, Column, Paragraph, Section, Sheet, Table, columns_of, with_notes
 from rbdyn.base.files import write_json
 from rbdyn.base.records import Record, written
-from rbdyn.base.tables.sheet import text_of
 from rbdyn.base.words import all_of, counted, quantity, shown
 from rbdyn.scene.unknown import UnknownInput
 
@@ -174,8 +173,7 @@ def write_uncertainty(uncertainty: Uncertainty, folder: Path) -> list[str]:
     """uncertainty.json, input_sets.csv, ranges.csv, shares.csv and uncertainty.png; returns their names."""
     write_json(folder / "uncertainty.json", uncertainty.as_dict())
     rows, outputs = set_rows(uncertainty), uncertainty.responses.values()
-    with (folder / "input_sets.csv").open("w", newline="", encoding="utf-8") as file:
-        csv.writer(file).writerows(map(text_of, row) for row in (rows[0], *(row.values() for row in rows)))
+    write_sample(rows, folder / "input_sets.csv")
     sheets = range_sheet(outputs).save(folder), share_sheet(outputs).save(folder)
     draw_uncertainty(uncertainty, folder / "uncertainty.png")
     return ["uncertainty.json", "input_sets.csv", *sheets, "uncertainty.png"]
