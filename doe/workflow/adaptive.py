@@ -253,9 +253,7 @@ def compare_fronts(study: Problem, adaptive: Adaptive, on_surfaces: Array) -> Fr
     costs = goals.costs(search.predictions)
     best = costs[non_dominated(costs)]
     scale = best.min(axis=0), best.max(axis=0)
-    ideal, nadir = (
-        dict(zip((study.responses[index] for index in goals.objectives), ends.tolist(), strict=True)) for ends in scale
-    )
+    ideal, nadir = (dict(zip(study.aims, ends.tolist(), strict=True)) for ends in scale)
     front = search.front
     fresh, error = noisy_hypervolume(front.costs, front.cost_errors, *scale, NOISE_DRAWS, front.seed)
     return FrontComparison(
@@ -287,7 +285,6 @@ class Pull(NamedTuple):
 
 def pulls(study: Problem, adaptive: Adaptive, pick: Array) -> list[Pull]:
     """For each factor of a point (k,) in factor units, the directions in which the responses with a goal improve."""
-    names = [study.responses[index] for index in study.goals.objectives]
     span = np.ptp(adaptive.search.front.goals.costs(adaptive.search.predictions), axis=0)
     factor_pulls = []
     for index, (low, high) in enumerate(adaptive.edges.tolist()):
@@ -300,7 +297,7 @@ def pulls(study: Problem, adaptive: Adaptive, pick: Array) -> list[Pull]:
         more = (costs_here - costs_above > LITTLE) & (costs_above < costs_below)
         less = (costs_here - costs_below > LITTLE) & (costs_below <= costs_above)
         turn = ~more & ~less & (np.maximum(costs_above, costs_below) - costs_here > LITTLE)
-        ways = [[name for name, flag in zip(names, mask, strict=True) if flag] for mask in (more, less, turn)]
+        ways = [[name for name, flag in zip(study.aims, mask, strict=True) if flag] for mask in (more, less, turn)]
         at_face = _face(study, adaptive, index, float(pick[index]))
         factor_pulls.append(Pull(study.factors[index], float(pick[index]), ways[0], ways[1], ways[2], at_face))
     return factor_pulls

@@ -226,7 +226,6 @@ def worse_notes(gains: Mapping[str, Gain]) -> Notes:
 
 def whirl_sentence(study: Problem, confirmed: Mapping[str, Confirmed]) -> str:
     """A warning that the whirl deviation ratio, which has a goal, is that of a trembling cage; else empty."""
-    objectives = [study.responses[index] for index in study.goals.objectives]
     radii = []
     for name in ("baseline", "pick"):
         result = confirmed[name].result
@@ -234,7 +233,7 @@ def whirl_sentence(study: Problem, confirmed: Mapping[str, Confirmed]) -> str:
             points = ", ".join(result.jitter_points) if isinstance(result, DutyResult) else ""
             where = f"{point_words(name)}{f' ({points})' if points else ''}"
             radii.append(f"{where} {result.cage_orbit_radius_share.value:.2g}")
-    if WHIRL not in objectives or not radii:
+    if WHIRL not in study.aims or not radii:
         return ""
     return f"Do not choose by the {WHIRL}: the cage does not whirl (orbit over clearance: {', '.join(radii)})."
 

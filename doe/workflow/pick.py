@@ -481,7 +481,6 @@ def _gains_by_simulation(
     labels = [f"beyond the bound of {study.factors[index]}" for index, _ in reachable]
     results = simulations.run(runs, labels, simulations.progress("beyond the region")) if reachable else []
     goals = study.goals
-    responses = [study.responses[index] for index in goals.objectives]
     gains_beyond = {}
     for (index, point), result in zip(reachable, results, strict=True):
         if isinstance(result, Failure):
@@ -490,5 +489,5 @@ def _gains_by_simulation(
         gain = (goals.costs(pick.values) - goals.costs(outer_point.values)) / (AHEAD * study.step[index])
         joint = (pick.estimate - outer_point.estimate).half_width[goals.objectives]
         figures = zip(gain.tolist(), (joint / (AHEAD * study.step[index])).tolist(), strict=True)
-        gains_beyond[index] = dict(zip(responses, figures, strict=True))
+        gains_beyond[index] = dict(zip(study.aims, figures, strict=True))
     return gains_beyond

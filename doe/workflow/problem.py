@@ -76,6 +76,11 @@ class Problem(Study):
         return Goals.of([response.goal for response in responses], **settings)
 
     @cached_property
+    def aims(self) -> list[str]:
+        """Names of the responses with a goal."""
+        return [self.responses[index] for index in self.goals.objectives]
+
+    @cached_property
     def design(self) -> Design:
         """The design in the order of its runs. Raises InputError for impossible settings."""
         return design_of(self)

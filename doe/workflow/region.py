@@ -493,12 +493,11 @@ def slow_points(study: Problem, folder: Path, effort: Effort) -> list[str]:
         between = _at_temperatures_of(usual, _short_run(study, BETWEEN, more=2))
         early = _baseline_result(study, between, "the turns to discard", folder, effort)
         if not isinstance(early, Failure):
-            names, sooner = [study.responses[place] for place in study.goals.objectives], results_at(early)
-            turns = main_scene(study.usual_run).numerics.turns
+            sooner, turns = results_at(early), main_scene(study.usual_run).numerics.turns
             return [
                 point
                 for point, found in results_at(usual).items()
-                if any(_biased(found.responses[name], sooner[point].responses[name], turns) for name in names)
+                if any(_biased(found.responses[name], sooner[point].responses[name], turns) for name in study.aims)
             ]
     return [*study.shares] or [OPERATION]
 

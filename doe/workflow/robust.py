@@ -139,8 +139,7 @@ def find_robust_front(
     sets, places, rows = _runs(study, case, pairs, (low, high), simulations)
     emulators = _emulators(case, goals, sets, places, pairs.rows(rows), (low, high))
     share = settings.quantile if settings.front == "quantile" else None
-    names = [study.responses[index] for index in goals.objectives]
-    spent, q2 = settings.points, dict(zip(names, (emulator.q2 for emulator in emulators.gain), strict=True))
+    spent, q2 = settings.points, dict(zip(study.aims, (emulator.q2 for emulator in emulators.gain), strict=True))
     try:
         robust_front = front(
             lambda points: emulators.objectives(points, share),
@@ -164,13 +163,13 @@ def find_robust_front(
     confirmed = list[ConfirmedGain]()
     for number, (name, (point, reason)) in enumerate(candidates.items(), 1):
         gains, variances = fresh_pairs.gains(goals, number)
-        gained = dict(zip(names, _over_inputs(shrunk(gains, variances), share).tolist(), strict=True))
-        odds_of_gains = gain_chances(names, gains, variances, case.uncertain.seed)
+        gained = dict(zip(study.aims, _over_inputs(shrunk(gains, variances), share).tolist(), strict=True))
+        odds_of_gains = gain_chances(study.aims, gains, variances, case.uncertain.seed)
         confirmed.append(ConfirmedGain(name, reason, study.by_factor(point), gained, odds_of_gains))
     # The baseline and the pick ran before at the sets that are the study's own.
     spent += CONFIRMED * (len(candidates) - 1) + 2 * int((rows >= settings.points).sum())
     predicted = [
-        GainPoint(study.by_factor(point), dict(zip(names, gains, strict=False)))
+        GainPoint(study.by_factor(point), dict(zip(study.aims, gains, strict=False)))
         for point, gains in zip(robust_front.points, robust_front.values.tolist(), strict=True)
     ]
     return RobustFront(predicted, confirmed, q2), spent, (*sets.failures, *new_failures)
@@ -304,7 +303,6 @@ def judge(study: Problem, pick: Array, simulations: Simulations) -> Robust:
     quantiles = joint.sets(study.file.robust.points, seed)
     designs = {"baseline": study.assignments(study.baseline), "pick": study.assignments(pick)}
     pairs, spent, failures = _pairs_in_rounds(study, case, quantiles, designs, simulations)
-    names = [study.responses[index] for index in goals.objectives]
     gains, variances = pairs.gains(goals)
     # For the emulators, the effects of the other inputs are scatter.
     places, outside_shares = input_sets.strongest_inputs(case, pairs.quantiles, gains)
@@ -316,7 +314,7 @@ def judge(study: Problem, pick: Array, simulations: Simulations) -> Robust:
     if study.file.robust.front != "none":
         front, more_runs, new_failures = find_robust_front(study, case, pairs, pick, simulations)
         spent, failures = spent + more_runs, (*failures, *new_failures)
-    odds_of_gains = gain_chances(names, gains, variances, seed)
+    odds_of_gains = gain_chances(study.aims, gains, variances, seed)
     pair, decision = _decision_by_keys(case, inputs, analysis)
     robust = Robust(
         chances=odds_of_gains,
@@ -324,7 +322,7 @@ def judge(study: Problem, pick: Array, simulations: Simulations) -> Robust:
         pair=pair,
         halved=min(max(odds_of_gains.all.value + analysis.halved, 0.0), 1.0),
         front=front,
-        explained=dict(zip(names, analysis.explained, strict=True)),
+        explained=dict(zip(study.aims, analysis.explained, strict=True)),
         inputs=[UnknownInput.of(entry) for entry in case.every],
         screened=outside_shares,
         pairs=len(gains),

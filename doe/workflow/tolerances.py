@@ -420,8 +420,10 @@ class PickParts(Record, eq=False):
     def _names(self) -> list[str]:
         """Names of the gains and limits."""
         responses = self.study.responses
-        names = [f"{GAIN}{responses[index]}" for index in self.goals.objectives]
-        return [*names, *(f"{responses[index]} {sense} {limit:g}" for index, sense, limit in self.goals.limited)]
+        return [
+            *(f"{GAIN}{name}" for name in self.study.aims),
+            *(f"{responses[index]} {sense} {limit:g}" for index, sense, limit in self.goals.limited),
+        ]
 
     def _with_ranges(self, demands: Sequence[KeptGain], widest: WidestTolerances) -> list[KeptGain]:
         """The demands with the ends [%] of the gains of 95 % of the parts, where these do not count."""

@@ -376,8 +376,7 @@ def _end(study: Problem, name: str) -> str:
 def trust_sentence(study: Problem, adaptive: Adaptive) -> str:
     """How well the emulators predicted the fresh runs at their front."""
     search, front = adaptive.search, adaptive.search.front
-    objectives = [study.responses[index] for index in front.goals.objectives]
-    optimism = [f"{name} by {100.0 * x:.1f} %" for name, x in zip(objectives, front.optimism.tolist(), strict=True)]
+    optimism = [f"{name} by {100.0 * x:.1f} %" for name, x in zip(study.aims, front.optimism.tolist(), strict=True)]
     missed = np.hypot(search.bias, search.spread).tolist()
     errors = [f"{name} {times:.1f}" for name, times in zip(study.responses, missed, strict=True)]
     overconfident = [name for name, times in zip(study.responses, missed, strict=True) if times > SUFFICIENT_MISS]
