@@ -35,18 +35,9 @@ from doe.adaptive.emulators import (
     shares_of,
 )
 from doe.designs.optimal import Remaining
+from doe.pareto import InfeasibleError
 from doe.pareto.front import Samples, SimulatedFront
-from doe.pareto.search import (
-    NAMES,
-    Goals,
-    InfeasibleError,
-    Rule,
-    best_for_hypervolume,
-    dominates,
-    hypervolume,
-    pick_all,
-    spread,
-)
+from doe.pareto.search import NAMES, Goals, Rule, best_for_hypervolume, dominates, hypervolume, pick_all, spread
 from rbdyn.base.arrays import Array, Rows, Whole, one_thread
 from rbdyn.base.faults import MethodError
 from rbdyn.base.records import Record, keyed, outside_json

@@ -7,34 +7,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from doe.dimension_chain import refusal
+from doe.dimension_chain import links, refusal, yields
 from doe.dimension_chain.allocation import Allocation, total_cost
 from doe.dimension_chain.closing import ClosingFunction, NoValueError, interval, linear_interval, middle
-from doe.dimension_chain.links import (
-    DIGITS,
-    SLACK,
-    Chain,
-    Distribution,
-    Interval,
-    Part,
-    grade_words,
-    size_text,
-    stated_parts,
-)
+from doe.dimension_chain.links import SLACK, Chain, Distribution, Interval, Part, grade_words, size_text, stated_parts
 from doe.dimension_chain.reading import faults
-from doe.dimension_chain.yields import (
-    COMMON_LAWS,
-    Assemblies,
-    SelectiveAssembly,
-    closing_moments,
-    draw,
-    exact_shares,
-    moments,
-    normal_yield,
-    sampled_ppm,
-    selective_assembly,
-    standard_error,
-)
+from doe.dimension_chain.yields import Assemblies, SelectiveAssembly, draw, moments, normal_yield, standard_error
 from rbdyn.base.faults import InputError, MethodError
 from rbdyn.base.records import Record, derived, keyed, outside_json, shown, written
 
@@ -228,7 +206,7 @@ def _solved(search: Allocation, samples: int, seed: int) -> ChainResult:
     percent, sizes = _contributions(function, parts)
     verdict = _verdict(search, judged, partial(_accepted, samples=samples, seed=seed))
     return ChainResult(
-        nominal_mm=round(float(function.value({part.name: part.nominal_mm for part in parts})), DIGITS),
+        nominal_mm=round(float(function.value({part.name: part.nominal_mm for part in parts})), links.DIGITS),
         worst_case_mm=interval(function, parts, "worst_case"),
         rss_mm=interval(function, parts, "rss"),
         yields=assemblies.yields,
@@ -241,7 +219,7 @@ def _solved(search: Allocation, samples: int, seed: int) -> ChainResult:
         mean_mm=mean,
         standard_deviation_mm=deviation,
         quantiles_mm=dict(zip(QUANTILES, np.quantile(assemblies.values, QUANTILES).tolist(), strict=True)),
-        rejected=sampled_ppm(assemblies),
+        rejected=yields.sampled_ppm(assemblies),
         exact_yields=_exact(search, parts),
         normal_yield=normal_yield(function, parts, limits),
         cp=chain.width_mm / (6 * deviation) if varies else None,
@@ -288,7 +266,7 @@ def _judged(search: Allocation, samples: int, seed: int) -> _Judged:
     allocation = None if chain.is_stated else search.allocated()
     parts = stated_parts(chain.link) if chain.is_stated else allocation or search.narrowest()
     assemblies = draw(function, parts, limits, samples=samples, seed=seed)
-    matched = None if chain.selective is None else selective_assembly(function, parts, limits, chain.selective)
+    matched = None if chain.selective is None else yields.selective_assembly(function, parts, limits, chain.selective)
     status = None
     if allocation is not None:
         status = _allocated_status(chain)
@@ -314,8 +292,8 @@ def _with_sizes(chain: Chain, parts: Sequence[Part]) -> Chain:
     """The chain with the sizes of parts stated in its links."""
     sizes = {part.name: {key: getattr(part, key) for key in ("nominal_mm", "upper_mm", "lower_mm")} for part in parts}
     free = {link.name for link in chain.free}
-    links = [link.model_copy(update=sizes[link.name]) if link.name in free else link for link in chain.link]
-    return chain.model_copy(update={"link": links})
+    sized = [link.model_copy(update=sizes[link.name]) if link.name in free else link for link in chain.link]
+    return chain.model_copy(update={"link": sized})
 
 
 def _verdict(search: Allocation, judged: _Judged, accepted: refusal.Judge) -> _Verdict:
@@ -367,13 +345,13 @@ def _exact(search: Allocation, parts: Sequence[Part]) -> dict[str, float] | None
     if not search.function.linear:
         return None
     limits = search.chain.closing_link
-    laws: dict[str, Distribution | None] = {"as_given": None, **{law: law for law in COMMON_LAWS}}
-    return {key: 1 - sum(exact_shares(search.function, parts, limits, law)) for key, law in laws.items()}
+    laws: dict[str, Distribution | None] = {"as_given": None, **{law: law for law in yields.COMMON_LAWS}}
+    return {key: 1 - sum(yields.exact_shares(search.function, parts, limits, law)) for key, law in laws.items()}
 
 
 def _linearisation(function: ClosingFunction, parts: Sequence[Part], assemblies: Assemblies) -> Linearisation:
     linear, true = (rule(function, parts, "worst_case") for rule in (linear_interval, interval))
-    mean, deviation = closing_moments(function, parts, None)
+    mean, deviation = yields.closing_moments(function, parts, None)
     sampled = float(assemblies.values.std())
     return Linearisation(
         linear_worst_case_mm=linear,

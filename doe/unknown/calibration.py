@@ -23,25 +23,9 @@ from typing import NamedTuple
 import numpy as np
 from scipy import special
 
+from doe.unknown import posterior
 from doe.unknown.inputs import nested, spread_out
-from doe.unknown.posterior import (
-    BEYOND,
-    BY_ROW,
-    PARTICLES,
-    STRONG,
-    Cells,
-    Errors,
-    Joint,
-    Level,
-    Measured,
-    Sampled,
-    Unseen,
-    effective,
-    fit_cells,
-    joint,
-    sampled,
-    unseen_offsets,
-)
+from doe.unknown.posterior import PARTICLES, Cells, Errors, Joint, Level, Measured, Sampled, Unseen, joint, sampled
 from doe.unknown.propagation import MEDIAN_FIRST
 from doe.unknown.width import Power, Scores, Width, prequential, scores_of, width
 from rbdyn.base.arrays import Array, Mask, Whole
@@ -64,7 +48,7 @@ def implausibility(cells: Cells, measured: Measured, quantiles: Array) -> tuple[
     emulator = (doubt**2).sum(axis=2) + cells.left_out[learnt]
     output = measured.output[learnt]
     apart, rig = np.abs(measured.values[learnt] - mean), measured.variances[learnt]
-    by_row = rig + (BY_ROW * measured.scales[output]) ** 2
+    by_row = rig + (posterior.BY_ROW * measured.scales[output]) ** 2
     return apart / np.sqrt(emulator + by_row + measured.allowed[output] ** 2), emulator / by_row
 
 
@@ -232,10 +216,10 @@ def _spread_over(
 
 
 def _emulated(batch: Batch, measured: Measured, before: Cells | None) -> Cells:
-    allowance = measured.variances + (BY_ROW * measured.scales[measured.output]) ** 2
+    allowance = measured.variances + (posterior.BY_ROW * measured.scales[measured.output]) ** 2
     # With an exact rig and no discrepancy the scatter of the runs themselves remains.
     allowance = np.maximum(allowance, 1e-3 * batch.values.var(axis=0) + 1e-12)
-    return fit_cells(*batch, allowance=allowance, before=before)
+    return posterior.fit_cells(*batch, allowance=allowance, before=before)
 
 
 def _misfit(cells: Cells, trial: Batch) -> float:
@@ -294,7 +278,7 @@ class Explanation(NamedTuple):
     @property
     def explained(self) -> bool:
         """Whether there is no strong evidence of an error beyond the allowed one; none is sought where none is allowed."""
-        return self.evidence is None or self.evidence < STRONG
+        return self.evidence is None or self.evidence < posterior.STRONG
 
 
 class Particles(Record, eq=False):
@@ -318,7 +302,7 @@ class Particles(Record, eq=False):
             joint.log_density(self.measured.values, conditions) - level.power * level.log_likelihood
             for level, joint in zip(self.levels, self.joints, strict=True)
         ]
-        best = int(np.argmax([effective(logs) for logs in weighed]))
+        best = int(np.argmax([posterior.effective(logs) for logs in weighed]))
         weights = np.exp(weighed[best] - weighed[best].max())
         rows = random.choice(len(weights), count, p=weights / weights.sum())
         return self.levels[best].points[rows], Joint(*(array[rows] for array in self.joints[best]))
@@ -390,7 +374,9 @@ def _crps(draws: Array, truth: Array) -> float:
 def explanations(names: Sequence[str], match: Matched, points: Array, seed: int) -> list[Explanation]:
     """Whether the simulation explains each output, by particles (n, d) of the posterior."""
     measured, joint, beyond = match.measured, match.joint(points), match.errors(points).beyond
-    unseen = unseen_offsets(match.cells, measured, match.quantiles, points[:, : match.unknowns.inputs].mean(axis=0))
+    unseen = posterior.unseen_offsets(
+        match.cells, measured, match.quantiles, points[:, : match.unknowns.inputs].mean(axis=0)
+    )
     middle, root = joint.latent(measured.values, measured.learnt)
     latent = middle + (root @ np.random.default_rng(seed).standard_normal((*middle.shape, 1)))[:, :, 0]
     listed = []
@@ -399,7 +385,7 @@ def explanations(names: Sequence[str], match: Matched, points: Array, seed: int)
         biases = latent[:, place] * joint.roots[:, cell, place]
         median, low, high = np.quantile(biases, MEDIAN_FIRST).tolist()
         scale, accuracy = float(measured.scales[place]), float(measured.accuracy[place])
-        factor = None if scale == 0.0 else bayes_factor(float(beyond[:, place].mean()), 2.0 * BEYOND)
+        factor = None if scale == 0.0 else bayes_factor(float(beyond[:, place].mean()), 2.0 * posterior.BEYOND)
         listed.append(Explanation(name, (median, low, high), scale, accuracy, factor, unseen[place]))
     return listed
 
@@ -412,7 +398,7 @@ def bayes_factor(share: float, before: float) -> float:
 
 def joint_factor(beyond: Mask) -> float:
     """The Bayes factor of an error beyond the allowed one in any output, from particles (n, m)."""
-    return bayes_factor(float(beyond.any(axis=1).mean()), 1.0 - (1.0 - 2.0 * BEYOND) ** beyond.shape[1])
+    return bayes_factor(float(beyond.any(axis=1).mean()), 1.0 - (1.0 - 2.0 * posterior.BEYOND) ** beyond.shape[1])
 
 
 class Judgement(Record, eq=False):
@@ -461,7 +447,7 @@ def objections(judgement: Judgement, *, has_learned: bool, emulated: bool) -> li
             off = f"{100.0 * np.expm1(output.bias[0]):+.2g} % off its level, {allowance_words(output.allowed, output.accuracy)}"
             cause = "its sensor is biased or physics is missing"
             sentences.append(f"{output.name} is not explained: {off}, Bayes factor {output.evidence:.3g}; {cause}")
-    if judgement.any_factor >= STRONG and not sentences:
+    if judgement.any_factor >= posterior.STRONG and not sentences:
         listed = " or ".join(
             output.name for output in sorted(outputs, key=lambda output: -(output.evidence or 0.0))[:2]
         )
