@@ -312,7 +312,12 @@ DUTY_COLUMNS: tuple[Column[DutyFigure], ...] = (
         meaning="gain of the selected design on the baseline at the point, positive where better, and its half width",
     ),
     Column("improvement_error_percent", at=("gain", "error_percent"), screen=False),
-    Column("verdict", at=("gain", "verdict"), screen=False, meaning="better, worse or within error"),
+    Column(
+        "verdict",
+        at=lambda row: "" if row.gain is None else row.gain.verdict,
+        screen=False,
+        meaning="better, worse or within error",
+    ),
     Column(
         "own_pick_percent",
         at=("cost", "percent"),
@@ -322,7 +327,7 @@ DUTY_COLUMNS: tuple[Column[DutyFigure], ...] = (
     Column("own_pick_error_percent", at=("cost", "error_percent"), screen=False),
     Column(
         "limit_verdict",
-        at=("limit", "verdict"),
+        at=lambda row: "" if row.limit is None else row.limit.verdict,
         screen=False,
         meaning="verdict on the limit of the response at the point",
     ),
