@@ -199,14 +199,14 @@ NOTHING: Mapping[str, str] = MappingProxyType({})
 
 
 def check_overrides(overrides: Sequence[str], inputs: Sequence[Input], fixed: Mapping[str, str] = NOTHING) -> None:
-    """Raises InputError for overrides that no run has: of inputs, unless their laws multiply them, and of ``fixed`` keys."""
+    """Raises InputError for overrides that no run has: of inputs, unless their ranges follow them, and of ``fixed`` keys."""
     claims = {
         unknown_input.key: (
             f"the {unknown_input.law.law} law of this unknown input replaces it; take one of them out, or multiply the value "
             "by times"
         )
         for unknown_input in inputs
-        if unknown_input.law.times != unknown_input.key
+        if unknown_input.law.times != unknown_input.key and not unknown_input.about_value
     }
     claims |= {key: f"is {what}, whose value each run has; leave it out" for key, what in fixed.items()}
     claimed = Claims({tuple(key.split(".")): reason for key, reason in claims.items()})

@@ -65,27 +65,23 @@ def bearings(series: str) -> Iterator[Weighed]:
         yield Weighed("M" in row["suffix"], known["mass"], steel, cage_in(series, width, inside))
 
 
-def cage_over_catalogue(series: str) -> tuple[np.ndarray, float, int]:
-    """Estimated over catalogue's mass of each brass cage of a series, the scale of steel, the error stated [%]."""
+def cage_over_catalogue(series: str) -> tuple[np.ndarray, float]:
+    """Estimated over catalogue's mass of each brass cage of a series, and the scale of steel."""
     rows = list(bearings(series))
     light = [(row.mass - POLYAMIDE * row.cage.volume) / row.steel for row in rows if not row.brass]
     scale = float(np.median(light))
     ratios = [BRASS * row.cage.volume / (row.mass - scale * row.steel) for row in rows if row.brass]
-    return np.array(ratios), scale, rows[0].cage.cage_error
+    return np.array(ratios), scale
 
 
 def masses() -> str:
     """Table of masses by series."""
-    lines = [
-        "| series | brass cages | steel scaled by | estimate over catalogue: median | 10 % to 90 % | error stated |"
-    ]
-    lines.append("| --- | --- | --- | --- | --- | --- |")
+    lines = ["| series | brass cages | steel scaled by | estimate over catalogue: median | 10 % to 90 % |"]
+    lines.append("| --- | --- | --- | --- | --- |")
     for series in SERIES:
-        ratios, scale, error = cage_over_catalogue(series)
+        ratios, scale = cage_over_catalogue(series)
         low, high = np.quantile(ratios, [0.1, 0.9])
-        lines.append(
-            f"| {series} | {ratios.size} | {scale:.3f} | {np.median(ratios):.2f} | {low:.2f} to {high:.2f} | {error} % |"
-        )
+        lines.append(f"| {series} | {ratios.size} | {scale:.3f} | {np.median(ratios):.2f} | {low:.2f} to {high:.2f} |")
     return "\n".join(lines)
 
 

@@ -19,6 +19,7 @@ from rbdyn.properties.drawing import (
 )
 from rbdyn.properties.materials import MATERIALS
 from rbdyn.properties.tolerances import Interference, housing_interference, shaft_interference
+from rbdyn.scene.uncertain import documented
 
 # Of a template, by the names in it.
 Values = dict[str, Any]
@@ -101,8 +102,8 @@ USUAL_GROOVES = (0.52, 0.53)
 BLOCK_BETWEEN = f"{catalogue.WIDEST_BAR:g} roller diameters; a block from pocket to pocket is stiffer than a bar"
 # Upper end of the documented range of an effective length (unknown_inputs.toml).
 LONGEST_EFFECTIVE = 1.05
-# Of a side ring's width [%]; that of a bearing whose own width is an estimate too.
-SIDE_RING_ERROR, BLIND_SIDE_RING_ERROR = 30, 50
+# Error of a side ring's width [%] where the width of the bearing is an estimate too.
+BLIND_SIDE_RING_ERROR = 50
 # Where no suffix names a cage, and where none and no option names a clearance.
 USUAL_CAGE, CLEARANCE = "MA", "CN"
 # Guide clearance in pitch diameters.
@@ -259,6 +260,24 @@ def _estimated(subject: Subject, inside: catalogue.RollerInterior) -> Values:
     }
 
 
+def error_of(key: str) -> int:
+    """Error of an estimated size [%]: the half width of its documented range."""
+    (entry,) = (entry for entry in documented() if entry.key == key)
+    return round(100.0 * ((entry.high or 1.0) - 1.0))
+
+
+def _side_ring(subject: Subject, landed: bool) -> Values:
+    """Error of a side ring's width, and of a land as wide, and their declarations in [uncertain]."""
+    rings = ("cage.land_width_mm", "cage.side_ring_width_mm")
+    if subject.width_known:
+        named = "".join(f'"{key}", ' for key in rings)
+        return {"side_ring_error": error_of(rings[1]), "estimated_ring": named, "land_law": None, "ring_law": None}
+    ends = f"low = {1.0 - 0.01 * BLIND_SIDE_RING_ERROR:g}, high = {1.0 + 0.01 * BLIND_SIDE_RING_ERROR:g}"
+    land, ring = (f'{{ law = "uniform", {ends}, times = "{key}" }}' for key in rings)
+    laws = {"land_law": land if landed else None, "ring_law": ring}
+    return {"side_ring_error": BLIND_SIDE_RING_ERROR, "estimated_ring": "", **laws}
+
+
 def ball_values(subject: Subject, options: Options) -> Values:
     """Values of ``ball_scene.toml``. Raises ValueError as ``roller_values``."""
     from rbdyn.life.balls import dynamic_capacity
@@ -361,7 +380,8 @@ def _cage(subject: Subject, inside: catalogue.RollerInterior) -> Values:
     guide = max(round(GUIDE_CLEARANCE * inside.pitch_diameter, 2), catalogue.SMALLEST_CLEARANCE_MM)
     return {
         "cage": cage,
-        "side_ring_error": SIDE_RING_ERROR if subject.width_known else BLIND_SIDE_RING_ERROR,
+        "cage_error": error_of("cage.mass_g"),
+        **_side_ring(subject, landed),
         "bar_width_by": BLOCK_BETWEEN
         if cage.bar_width == catalogue.WIDEST_BAR * inside.roller_diameter
         else inside.bar_width_by,

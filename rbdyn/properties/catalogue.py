@@ -424,13 +424,13 @@ CAGE_WIDTH, POCKET_CLEARANCE, END_PLAY = 0.95, 0.03, 0.02
 SMALLEST_CLEARANCE_MM, SMALLEST_PLAY_MM, NARROWEST_RING_MM = 0.05, 0.1, 0.5
 # A side ring has at least this share of a bar's length; what is wider than a bar of so many roller diameters is a block.
 NARROWEST_RING_SHARE, WIDEST_BAR = 0.03, 2.0
-# Radial thickness in roller diameters, by series, and its error by the catalogue [%]; of a bearing of no series that of them all.
+# Radial thickness in roller diameters, by series; the series of a drawing.
 NO_SERIES = ""
-THICKNESS, USUAL_THICKNESS = {"10": (0.42, 20), "22": (0.50, 35), NO_SERIES: (0.58, 40)}, (0.58, 25)
+THICKNESS, USUAL_THICKNESS = {"10": 0.42, "22": 0.50}, 0.58
 
 
 class CageEstimate(NamedTuple):
-    """Estimated dimensions of a cage [mm], volume [mm^3], thickness in roller diameters, error of thickness and volume [%]."""
+    """Estimated dimensions of a cage [mm], volume [mm^3], thickness in roller diameters."""
 
     pocket_clearance: float
     bar_width: float
@@ -439,7 +439,6 @@ class CageEstimate(NamedTuple):
     side_ring_width: float
     volume: float
     thickness_share: float
-    cage_error: int
 
 
 def cage_estimate(
@@ -447,7 +446,7 @@ def cage_estimate(
 ) -> CageEstimate:
     """Cage of a bearing of these dimensions [mm]; ``series``: "10", "2", "22", "3", "23" or ``NO_SERIES``."""
     clearance = max(round(POCKET_CLEARANCE * roller_diameter, 2), SMALLEST_CLEARANCE_MM)
-    share, error = THICKNESS.get(series, USUAL_THICKNESS)
+    share = THICKNESS.get(series, USUAL_THICKNESS)
     thickness = round(share * roller_diameter, 3)
     circumference = math.pi * pitch_diameter
     gap = round(circumference / rollers - roller_diameter - clearance, 3)
@@ -456,4 +455,4 @@ def cage_estimate(
     narrowest = max(NARROWEST_RING_MM, round(NARROWEST_RING_SHARE * length, 3))
     ring = max(round(0.5 * (CAGE_WIDTH * width - length), 3), narrowest)
     volume = thickness * (2.0 * ring * circumference + rollers * gap * length)
-    return CageEstimate(clearance, bar, thickness, length, ring, volume, share, error)
+    return CageEstimate(clearance, bar, thickness, length, ring, volume, share)

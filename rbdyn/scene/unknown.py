@@ -32,11 +32,12 @@ FOLLOWING = frozenset({*DERIVED, "model.pocket_bar_stiffness_N_m"})
 
 
 class Input(NamedTuple):
-    """An unknown input: its key, its law, and the reason for the law."""
+    """An unknown input: its key, its law, the reason for the law, and whether this is about the value of the key in the scene."""
 
     key: str
     law: Law | Sampled
     reason: str
+    about_value: bool = False
 
 
 # Words of the laws of inputs.
@@ -103,6 +104,7 @@ def inputs_of(
     """
     keys = {**uncertain.laws, **sample}
     documented_keys = {entry.key for entry in documented()}
+    about_values = {entry.key for entry in documented() if entry.plus == entry.key}
     faults = _key_faults(keys)
     others = Claims({tuple(key.split(".")): role for key, role in fixed.items()})
     faults += [
@@ -120,7 +122,7 @@ def inputs_of(
     inputs = [Input(key, law, "declared") for key, law in uncertain.laws.items() if key not in sample]
     inputs += [Input(key, values, "posterior sample") for key, values in sample.items()]
     inputs += [
-        Input(entry.key, entry.as_law, entry.reason)
+        Input(entry.key, entry.as_law, entry.reason, entry.key in about_values)
         for entry in documented_of(scene)
         if entry.key not in keys
         and others.reason_for(tuple(entry.key.split("."))) is None

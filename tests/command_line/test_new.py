@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 import subprocess
 import sys
 import tomllib
@@ -14,6 +15,7 @@ from typer.testing import CliRunner
 
 from rbdyn.cli.app import app
 from rbdyn.scene import Scene
+from rbdyn.scene.unknown import inputs_of
 
 QUICK = ("turns=3", "discard_turns=2", "replicates=2", "impact_window_turns=1", "companion=false", "extend=false")
 SET = [part for assignment in QUICK for part in ("--set", f"numerics.{assignment}")]
@@ -51,6 +53,26 @@ def test_command_line_balls_with_a_preload(command, tmp_path):
     record = json.loads(command("ball", path, "--json").stdout)
     assert record["status"] == "ok" and min(ball["inner_load_N"] for ball in record["balls"]) > 0.0
     assert record["life"]["L10_h"] > 1000.0
+
+
+OWN = ("own", "--rollers", "16", "--roller", "7x7", "--pitch", "60", "--guidance", "inner")
+PERCENT = re.compile(r"([a-z_]+) = ([0-9.]+) +# estimated: .*\+-(\d+) %$", re.MULTILINE)
+
+
+@pytest.mark.parametrize("bearing", [("NU210",), ("NU1020",), ("NJ2208",), OWN, (*OWN, "--width", "12")])
+def test_command_line_errors_of_a_cage_are_the_ranges_of_its_inputs(command, bearing):
+    """Command line: +-N % in a comment of [cage] is what an analysis of unknown inputs varies, and the declared keys vary."""
+    text = command("new", *bearing, *NU_210[1:]).stdout
+    scene = Scene.from_dict(tables := tomllib.loads(text))
+    laws = {entry.key: entry.law for entry in inputs_of(scene, tables, scene.uncertain)}
+    stated = PERCENT.findall(text.partition("[cage]")[2].partition("\n[")[0])
+    assert {"mass_g", "bar_thickness_mm", "side_ring_width_mm"} <= {key for key, *_ in stated}
+    for key, _, percent in stated:
+        law = laws[f"cage.{key}"]
+        assert (law.low, law.high) == pytest.approx((1.0 - 0.01 * float(percent), 1.0 + 0.01 * float(percent)))
+        assert law.times == f"cage.{key}"
+    ring, land = laws["cage.side_ring_width_mm"], laws.get("cage.land_width_mm")
+    assert land is None or (land.low, land.high) == (ring.low, ring.high)
 
 
 def test_command_line_json_is_the_scene(command):

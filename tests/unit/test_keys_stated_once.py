@@ -319,6 +319,7 @@ def test_unit_set_on_the_command_line_of_an_unknown_input() -> None:
     with pytest.raises(InputError, match=r"--set cage\.mass_g=46: the uniform law of this unknown input replaces it"):
         check_overrides(["cage.mass_g=46"], _case_with(MASS).every)
     check_overrides(["cage.mass_g=46"], _case_with(_relative("cage.mass_g", "cage.mass_g")).every)
+    check_overrides(["lubricant.temperature_C=80"], _case_with({"estimated": ["lubricant.temperature_C"]}).every)
     with pytest.raises(InputError, match=r"is a column of rig\.csv, whose value each run has"):
         check_overrides(["operation.inner_speed_rpm=1"], [], {"operation.inner_speed_rpm": "a column of rig.csv"})
     case = read_case(SCENE, ("impact_force_N",), ["cage.imbalance_um=7.0"])

@@ -120,6 +120,17 @@ def test_invariant_defaults_of_every_material_lie_in_their_documented_ranges(par
     assert Scene(**{**data, "materials": Materials.model_validate({part: material})}).model == scene.model
 
 
+@pytest.mark.parametrize("celsius", [-10.0, 0.0, 70.0])
+def test_unit_an_estimated_oil_temperature_is_ten_kelvins_wide_at_any_temperature(celsius: float) -> None:
+    """Unit: contacts differ from the supply by up to 10 K (reason of the range), in cold oil too, and at 0 C."""
+    scene = Scene.load(SCENE, [f"lubricant.temperature_C={celsius}"])
+    uncertain = _uncertain(defaults="none", estimated=["lubricant.temperature_C"])
+    (entry,) = inputs_of(scene, read_toml(SCENE), uncertain)
+    assert values_of(entry.law, np.array([0.0, 0.5, 1.0])) == pytest.approx(
+        [celsius - 10.0, celsius, celsius + 10.0], abs=1e-9
+    )
+
+
 @pytest.mark.parametrize("switch", SWITCHED)
 def test_invariant_defaults_of_every_law_lie_in_their_documented_ranges(switch: str) -> None:
     """Invariant: the same of what each law and oil switches on, in the plain example."""
