@@ -320,12 +320,16 @@ def kinds() -> "dict[str, type[BaseModel]]":
 
 def status(
     path: Annotated[
-        Path, typer.Argument(metavar="FILE.toml", help="Study, or scene of an uncertainty analysis or calibration.")
+        Path,
+        typer.Argument(
+            metavar="FILE", help="Study, scene of an uncertainty analysis or calibration, or table of doe run."
+        ),
     ],
     out: Annotated[
         Path | None,
         folder_option(
-            "Folder of the runs.", "where it runs, otherwise STUDY_results, SCENE_uncertainty or _calibration"
+            "Folder of the runs.",
+            "where it runs, otherwise STUDY_results, TABLE_results, SCENE_uncertainty or _calibration",
         ),
     ] = None,
     as_json: Json = False,

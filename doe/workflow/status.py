@@ -26,7 +26,7 @@ from rbdyn.base.faults import InputError, read_bytes, read_toml
 from rbdyn.base.files import code_version, digest_of, intact, read_json, versions
 from rbdyn.base.identity import Identity, identity_of
 from rbdyn.base.records import Record, plain
-from rbdyn.base.tables.sheet import split_path
+from rbdyn.base.tables.sheet import TABLES, split_path
 from rbdyn.scene import Scene
 
 # Typical wall time [s] of surfaces, front, pictures and report.
@@ -249,11 +249,14 @@ def study_status(study: Problem, folder: Path) -> dict[str, Any]:
     return _record(study.path, folder, content, agenda, answered, counts, other_counts, failures)
 
 
-def scene_status(path: Path, folder: Path) -> dict[str, Any]:
-    """Record of ``doe status`` for ``doe uncertainty`` or ``doe calibrate`` of a scene. Raises InputError."""
+def scene_status(path: Path, folder: Path, is_table: bool = False) -> dict[str, Any]:
+    """Record of ``doe status`` for ``doe uncertainty`` or ``doe calibrate`` of a scene, ``doe run`` of a table. Raises InputError.
+
+    The rows of a table belong to scenes that it may not name, so a finished table counts as finished after a change too.
+    """
     content = Content.of(folder, [])
     agenda = content.agenda or Agenda("", {}, "", 1, [])
-    unchanged = agenda.inputs == content_digest(path)
+    unchanged = content_digest(path) == agenda.inputs or is_table
     answered = unchanged and agenda.files is not None and all((folder / name).is_file() for name in agenda.files)
     past_stages, stages_ahead = agenda.stages[: agenda.place], agenda.stages[agenda.place :]
     total = sum(stage.finished_runs for stage in past_stages) + sum(stage.runs for stage in stages_ahead)
@@ -271,7 +274,10 @@ def scene_status(path: Path, folder: Path) -> dict[str, Any]:
 
 
 def status_of(path: Path, folder: Path | None) -> dict[str, Any]:
-    """Record of ``doe status`` for a study or a scene, in its own folder by default. Raises InputError."""
+    """Record of ``doe status`` for a study, a scene or a table of scenes, in its own folder by default. Raises InputError."""
+    file, _ = split_path(path)
+    if file.suffix.lower() in TABLES:
+        return scene_status(file, folder or folder_of(path, "{}_results"), is_table=True)
     if "bearing" in read_toml(path):
         return scene_status(path, folder or folder_of(path, *SCENE_FOLDERS))
     return study_status(Problem.load(path), folder or folder_of(path, "{}_results"))

@@ -88,7 +88,7 @@ def with_start(balanced: Balanced) -> SimulationResult:
         note = Note("seizure", f"start: the cold machine cannot run: {error.faults[0]}")
         return replace(result, status=_status(result, "seizure"), notes=(note, *result.notes))
     except RunError as error:
-        note = Note("failed", f"start: the cold machine cannot run: {error}")
+        note = Note("failed", f"start: it cannot be computed: {error}")
         return replace(result, notes=(note, *result.notes))
     cost = {**result.cost, **work_done([*balance.runs, *(run for each in runs for run in each.runs)])}
     turns = balance.turns + sum(each.turns for each in runs)

@@ -15,8 +15,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rbdyn.base.arrays import Array
-from rbdyn.base.faults import InputError
-from rbdyn.base.notes import Notes, status_notes
+from rbdyn.base.faults import InputError, RunError
+from rbdyn.base.notes import Note, Notes, status_notes
 from rbdyn.clearances import DIFFERENCE
 from rbdyn.life.friction import NO_AXIAL_LOAD
 from rbdyn.quasistatic.result import BallResult, Rating, pressures, reference_capacities
@@ -130,12 +130,18 @@ class Path(NamedTuple):
 
 
 def with_start(scene: SingleRowScene, search: Search, result: BallResult, ranged: bool) -> BallResult:
-    """The result of a scene with the start of its cold machine, or with a status where this is impossible from the first moment."""
+    """The result of a scene with the start of its cold machine, or with a status where this is impossible from the first moment.
+
+    A start that cannot be integrated leaves the result as it is, with a note.
+    """
     assert result.notes is not None or not result.is_equilibrium
     try:
         start, notes = _start(scene, search, ranged)
     except InputError as error:
         return replace(result, status=f"seizure: start: the cold machine: {error.faults[0]}", report=None, rows=())
+    except RunError as error:
+        failed = Note("failed", f"start: it cannot be computed: {error}")
+        return replace(result, notes=None if result.notes is None else (failed, *result.notes))
     result = replace(result, start=start, notes=None if result.notes is None else (*notes, *result.notes))
     if result.status != "ok" or start.status not in ("seizure", "too hot", "no steady state"):
         return result

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from rbdyn.base.arrays import Array
-from rbdyn.base.faults import RPM, MethodError
+from rbdyn.base.faults import RPM, RunError
 from rbdyn.thermal.losses import DEGREES, HOTTEST, HeatModel
 from rbdyn.thermal.network import INNER, NODES, OUTER, Boundaries, Conductances, matrix, source
 
@@ -335,7 +335,7 @@ def integrate(
     """Temperatures from ``start`` (..., n) [C] until ``end`` [s]: C dT/dt = net heat, by LSODA.
 
     ``capacities`` C (..., n) [J/K]; further axes are machines that do not meet. ``breaks``: times [s] at which the net heat has a
-    kink or a step. ``tolerance``: relative, and absolute in kelvins.
+    kink or a step. ``tolerance``: relative, and absolute in kelvins. Raises RunError where LSODA fails.
     """
     from scipy.integrate import solve_ivp
 
@@ -354,7 +354,7 @@ def integrate(
             rise, (first, last), found[-1][-1], method="LSODA", t_eval=rows, rtol=tolerance, atol=tolerance, **bands
         )
         if not part.success:
-            raise MethodError(f"temperatures over time: the integration ends at {part.t[-1]:.3g} s: {part.message}")
+            raise RunError(f"temperatures over time: the integration ends at {part.t[-1]:.3g} s: {part.message}")
         found.append(part.y.T)
     return Warming(times, np.concatenate(found).reshape(-1, *shape))
 

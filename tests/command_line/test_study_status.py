@@ -20,6 +20,7 @@ from synthetic_study import summary as made_up
 from typer.testing import CliRunner
 
 from doe import clearance
+from doe import run as run_table
 from doe.cli import app
 from doe.commands.functions import status_blocks
 from doe.running.runner import Stage, agenda_in
@@ -27,7 +28,7 @@ from doe.running.store import STALE_S, STORE, Point, Store, at_work
 from doe.workflow.problem import Problem
 from doe.workflow.status import content_digest, inputs_digest, scene_status, status_of, study_stages, study_status
 from rbdyn.base.blocks import Detail
-from rbdyn.base.faults import read_toml
+from rbdyn.base.faults import InputError, read_toml
 from rbdyn.base.files import digest_of, sign
 from rbdyn.base.terminal import show
 from rbdyn.dynamics import simulate as module
@@ -310,6 +311,23 @@ def test_finished_uncertainty_is_so_until_its_scene_changes(tmp_path, monkeypatc
     assert scene_status(path, out)["status"] == "finished" and scene_status(path, out)["runs_left"] == [0, 0]
     path.write_text(path.read_text(encoding="utf-8") + "\n# another\n", encoding="utf-8")
     assert scene_status(path, out)["status"] == "unfinished"
+
+
+def test_command_line_status_of_a_table_of_scenes(tmp_path, monkeypatch):
+    """Command line: a table is found in its folder, unfinished while rows are missing; one that is missing is named."""
+    scene = short_study(tmp_path).with_name("cylindrical_roller.toml")
+    table, out = tmp_path / "table.csv", tmp_path / "table_results"
+    table.write_text("seed\n1\n2\n3\n", encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    instantly(monkeypatch.setattr, faulty=[2])
+    run_table(table, scene, out=out, workers=1)
+    record = status_of(table, None)
+    assert record["status"] == "finished" and record["study"] == str(table)
+    assert record["points"] == {"total": 3, "done": 2, "failed": 1, "running": 0, "missing": 0}
+    (out / "runs.csv").unlink()
+    assert status_of(table, out)["status"] == "unfinished"
+    with pytest.raises(InputError, match=r"nothing\.csv"):
+        status_of(tmp_path / "nothing.csv", None)
 
 
 def test_fault_that_ended_a_command_is_told(tmp_path, monkeypatch):

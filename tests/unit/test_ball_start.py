@@ -53,6 +53,24 @@ def cold() -> BallResult:
     return rbdyn.equilibrium(_example(thermal__start={}))
 
 
+def test_stiff_a_course_that_cannot_be_integrated_leaves_the_equilibrium(monkeypatch, cold):
+    """Stiff: where LSODA gives up, the steady bearing is answered all the same, and a note says at what time it ended."""
+    from scipy import integrate
+
+    whole = integrate.solve_ivp
+
+    def given_up(*arguments, **options):
+        solution = whole(*arguments, **options)
+        solution.success, solution.message = False, "Repeated convergence failures."
+        return solution
+
+    monkeypatch.setattr(integrate, "solve_ivp", given_up)
+    result = rbdyn.equilibrium(_example(thermal__start={}))
+    assert result.start is None and result.status == "ok" and result.thermal == cold.thermal
+    (note,) = [note for note in result.notes if note.code == "failed"]
+    assert "start: it cannot be computed: temperatures over time: the integration ends at" in str(note)
+
+
 def test_unit_end_of_the_course_is_the_steady_balance(cold):
     """Unit: the course begins cold and ends at the steady temperatures, clearance and axial load of the balance."""
     start, steady = cold.start, cold.thermal

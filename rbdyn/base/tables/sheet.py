@@ -32,6 +32,8 @@ PARQUET = (".parquet", ".pq")
 SEPARATORS = {",": "commas", ";": "semicolons", "\t": "tabs"}
 SEMICOLONS = ", or save it with semicolons if its numbers have decimal commas"
 WORKBOOKS, SHEET_PATH = (".xlsx", ".xlsm"), re.compile(r"(.+\.xls[xm]):([^:]+)", re.IGNORECASE | re.DOTALL)
+# Endings by which a command that reads TOML too knows a table.
+TABLES = (".csv", ".tsv", ".txt", *WORKBOOKS, *PARQUET)
 # First bytes of an archive, as of a workbook, and of an old or encrypted workbook.
 ARCHIVES = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0")
 # Excel's own line on the separator of a file.
