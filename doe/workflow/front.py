@@ -257,11 +257,8 @@ class ErrorField:
 
     def __call__(self, coded: Array, forecast_errors: Array) -> tuple[Array, Array]:
         """Mean (n,) and standard deviation (n,) of the error at coded points (n, k); ``forecast_errors`` (n,) are those stated."""
-        link = (
-            self._scale**2
-            * correlation(coded, self._misses.points)
-            * np.outer(forecast_errors, self._misses.forecast_errors)
-        )
+        stated = np.outer(forecast_errors, self._misses.forecast_errors)
+        link = self._scale**2 * correlation(coded, self._misses.points) * stated
         projected = link @ self._solve
         variance = (self._scale * forecast_errors) ** 2 - (projected * link).sum(axis=1)
         return projected @ self._misses.misses, np.hypot(np.sqrt(variance.clip(0.0)), self._more)

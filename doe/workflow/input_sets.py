@@ -286,12 +286,8 @@ def case_of(
     exact = [
         entry.key for entry in documented_of(case.scene_of_sets) if not entry.on_request and entry.key not in constant
     ]
-    case = replace(
-        case,
-        every=inputs,
-        doubt=doubt,
-        remarks=tuple(Note("inputs", text) for text in _remarks(len(keys), by_set, idle_keys, exact)),
-    )
+    remarks = tuple(Note("inputs", text) for text in _remarks(len(keys), by_set, idle_keys, exact))
+    case = replace(case, every=inputs, doubt=doubt, remarks=remarks)
     case.joint(inputs)
     refuse(impossible(case))
     return case

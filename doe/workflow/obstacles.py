@@ -245,11 +245,8 @@ def _least_move(study: Problem, pick: Confirmed, sides: Array, places: list[int]
     outward[places] = (0.5 * (ends[:, 1] - ends[:, 0]) * sides)[places]
     shares = np.linspace(0.0, 1.0, STEPS + 1)[1:]
     points = np.array([study.rounded(pick.point + share * outward) for share in shares])
-    values = (
-        pick.values
-        + predict_all(study.surfaces, study.coded(points))
-        - predict_all(study.surfaces, study.coded(pick.point[None]))
-    )
+    predicted, at_pick = (predict_all(study.surfaces, study.coded(place)) for place in (points, pick.point[None]))
+    values = pick.values + predicted - at_pick
     broken = np.zeros(len(points), dtype=bool)
     for limit in every_limit(study, pick):
         column = values[:, study.responses.index(limit.response)]

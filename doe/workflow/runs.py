@@ -133,12 +133,8 @@ def run_design(study: Problem, simulations: clearance.Simulations, progress: Pro
         raise RunError(f"only {len(rows)} of {len(results)} design runs succeeded{lacking}: {sentence(failures)}")
     sound = [result for result in results if not isinstance(result, Failure)]
     # Whether few replicates suffice is judged by what the surfaces make of them.
-    notes = _distinct_notes(
-        [
-            [note for note in result.notes if not study.further_replicates or note.code != "few-samples"]
-            for result in sound
-        ]
-    )
+    left_out = "few-samples" if study.further_replicates else ""
+    notes = _distinct_notes([[note for note in result.notes if note.code != left_out] for result in sound])
     if "life_h" in study.figures and main_scene(study.usual_run).bearing.roller_profile == "cylinder":
         notes.append(PLAIN_ROLLERS)
     if failures:
@@ -146,10 +142,8 @@ def run_design(study: Problem, simulations: clearance.Simulations, progress: Pro
         instead = (
             f" {counted(added, 'other run')} in the rest of the region {are(added)} in their place." if added else ""
         )
-        left_out = f"{counted(len(failures), 'design run')} failed and {are(len(failures))} left out: {sentence(failures).rstrip('.')}."
-        notes.insert(
-            0, Note("lost-runs", f"{left_out}{instead} Front and selected design stay near runs that went well.")
-        )
+        lost = f"{counted(len(failures), 'design run')} failed and {are(len(failures))} left out: {sentence(failures).rstrip('.')}."
+        notes.insert(0, Note("lost-runs", f"{lost}{instead} Front and selected design stay near runs that went well."))
     values, errors, independent = clearance.figures(study.responses, sound)
     block = np.array(design.block_numbers)[rows] if design.blocks > 1 else None
     runs = Runs(

@@ -70,11 +70,8 @@ class SceneTable(Record):
 
     def scene(self, row: SceneRow) -> Scene:
         """The scene of a row. Raises InputError with its faults."""
-        source = (
-            f"row {row.number}"
-            if row.name == str(row.number)
-            else f"row {row.number} ({one_line(row.name, LONGEST_NAME)})"
-        )
+        name = "" if row.name == str(row.number) else f" ({one_line(row.name, LONGEST_NAME)})"
+        source = f"row {row.number}{name}"
         refuse(row.faults)
         if row.file is not None and row.designation:
             raise InputError(

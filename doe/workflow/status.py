@@ -148,11 +148,8 @@ def finished_record(folder: Path, digest: str) -> dict[str, Any] | None:
     """The record of a finished study with this digest of its inputs, if it is intact with all its files; else None."""
     try:
         record = read_json(folder / "summary.json")
-        complete = (
-            intact(record)
-            and record["inputs"] == digest
-            and all(map(Path.is_file, map(folder.joinpath, record["files"])))
-        )
+        files = map(folder.joinpath, record["files"])
+        complete = intact(record) and record["inputs"] == digest and all(map(Path.is_file, files))
         complete = complete and record["answer_sha256"] == digest_of((folder / "answer.txt").read_bytes())
     except (OSError, ValueError, KeyError, TypeError, AttributeError):
         return None

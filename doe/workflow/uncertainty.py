@@ -136,13 +136,8 @@ def find_uncertainty(
     outside_shares = input_sets.shares_outside(case, covered_places, sets.quantiles, sets.signals)
     still = "in every input set, because no unknown input changes it"
     idle_notes = [Note("remark", f"{name}: it is {value:.5g} {still}") for name, value in idle.items()]
-    notes = _notes(
-        [*idle_notes, *case.notes, *override_notes(case, overrides, "the run at the scene's own inputs")],
-        sets,
-        outputs,
-        count,
-        target,
-    )
+    further = override_notes(case, overrides, "the run at the scene's own inputs")
+    notes = _notes([*idle_notes, *case.notes, *further], sets, outputs, count, target)
     return Uncertainty(
         scene=str(path),
         responses={output.name: output for output in outputs},

@@ -102,16 +102,12 @@ def measured_sheet(calibration: identification.Calibration) -> Sheet[identificat
 def blocks(calibration: identification.Calibration) -> list[Block]:
     """The verdict with its reasons, inputs, identified combinations, outputs, the quality of predictions, and notes."""
     calibrated = calibration.verdict == identification.CALIBRATED
+    explained = [_output_words(*item) for item in calibration.outputs.items() if item[1].evidence is not None]
     answer: list[Block] = [
         Paragraph(verdict_words(calibration), "statement" if calibrated else "warning"),
         Bullets([] if calibrated else _hidden(calibration)),
         input_sheet(calibration).block,
-        Bullets(
-            [
-                *map(_combination, calibration.learnt.combinations),
-                *(_output_words(*item) for item in calibration.outputs.items() if item[1].evidence is not None),
-            ]
-        ),
+        Bullets([*map(_combination, calibration.learnt.combinations), *explained]),
         Bullets([*_prediction_quality(calibration.held_out), *_outliers(calibration)]),
         Paragraph(_screened(calibration.screened)),
         Paragraph(_cost_words(calibration.cost), "small"),

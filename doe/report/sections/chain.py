@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
+from operator import attrgetter
 from typing import TYPE_CHECKING, Any
 
 from doe.dimension_chain import ChainResult
@@ -131,16 +132,9 @@ def closing_sheet(chains: Mapping[str, ChainResult]) -> Sheet[tuple[str, ChainRe
 def share_sheet(chains: Mapping[str, ChainResult]) -> Sheet[Any]:
     """contributions.csv: what each part takes of the scatter."""
     rows = [(name, part, shares) for name, chain in chains.items() for part, shares in chain.contributions.items()]
-    columns = (
-        *NAMES,
-        Column[Any](
-            "variance_percent",
-            at=(2, "variance_percent"),
-            meaning="share in the variance of the closing link, and in its worst case",
-        ),
-        Column[Any]("worst_case_percent", at=(2, "worst_case_percent")),
-    )
-    return Sheet("", columns, rows, file="contributions.csv", content="One row per part of each chain.")
+    meaning = "share in the variance of the closing link, and in its worst case"
+    shares = Column[Any]("{}", at=(2, "{}"), meaning=meaning).of(key for key, _ in KINDS)
+    return Sheet("", (*NAMES, *shares), rows, file="contributions.csv", content="One row per part of each chain.")
 
 
 def estimates_note(sizes: Mapping[str, PartSize]) -> str:
@@ -157,13 +151,8 @@ def estimates_note(sizes: Mapping[str, PartSize]) -> str:
 def _refusal(name: str, chain: ChainResult) -> list[Block]:
     """By how much a chain misses its limits, why, what would meet them, and the nearest sizes that do."""
     stated, nearest = chain.drawn_sizes, chain.allocated
-    figures = ("nominal_mm", "upper_mm", "lower_mm")
-    differs = any(
-        getattr(size, key) != getattr(stated[part], key)
-        for part, size in nearest.items()
-        if part in stated
-        for key in figures
-    )
+    figures = attrgetter("nominal_mm", "upper_mm", "lower_mm")
+    differs = any(figures(size) != figures(stated[part]) for part, size in nearest.items() if part in stated)
     return [
         Paragraph(_miss(name, chain), "warning"),
         Paragraph(_sentence(chain.status)),
@@ -177,16 +166,9 @@ def _miss(name: str, chain: ChainResult) -> str:
     missed = chain.missed
     if missed and missed.yield_short:
         return f"Chain {label(name)} does not reach its yield: {missed.yield_short:.4g} of the assemblies too many are outside its limits."
-    ends = (
-        ()
-        if missed is None
-        else (
-            (missed.below_mm, "below the lower limit"),
-            (missed.above_mm, "above the upper limit"),
-            (missed.width_mm, "more than their distance"),
-        )
-    )
-    figures = [f"{size:.4f} mm {words}" for size, words in ends if size]
+    sizes = () if missed is None else (missed.below_mm, missed.above_mm, missed.width_mm)
+    ends = "below the lower limit", "above the upper limit", "more than their distance"
+    figures = [f"{size:.4f} mm {words}" for size, words in zip(sizes, ends, strict=False) if size]
     return f"Chain {label(name)} violates its limits: {', '.join(figures) or chain.status}."
 
 

@@ -102,14 +102,9 @@ def power_sheet(evaluation: Evaluation, columns: tuple[Column[TermQuality], ...]
 def _evaluation(evaluation: Evaluation) -> list[Block]:
     """Single figures in one table; figures by term in another; the variances in pictures."""
     what = "Scaled prediction variance: least, mean and largest by radius"
-    return [
-        quality_table(evaluation),
-        power_sheet(evaluation, BY_TERM).block,
-        Figures(
-            [still.svg for still in evaluation_plots(evaluation)],
-            f"{what}; and the value below which a share of the region is.",
-        ),
-    ]
+    caption = f"{what}; and the value below which a share of the region is."
+    pictures = Figures([still.svg for still in evaluation_plots(evaluation)], caption)
+    return [quality_table(evaluation), power_sheet(evaluation, BY_TERM).block, pictures]
 
 
 def failure_table(failures: Sequence[Cause]) -> Table:
@@ -122,12 +117,10 @@ def evaluation_plots(evaluation: Evaluation) -> list[Still]:
     shells, shares = evaluation.by_radius, evaluation.fraction_of_design_space
     curves = {key: [(shell.radius, getattr(shell, key)) for shell in shells] for key in ("min", "mean", "max")}
     points = {"mean": [(share.percent, share.variance) for share in shares]}
+    by_share = partial(_variance, "share of the region [%]", points)
     return [
         Still("Scaled prediction variance by radius: least, mean, largest", partial(_variance, "coded radius", curves)),
-        Still(
-            "Scaled prediction variance by share of the region below it",
-            partial(_variance, "share of the region [%]", points),
-        ),
+        Still("Scaled prediction variance by share of the region below it", by_share),
     ]
 
 

@@ -366,11 +366,9 @@ def _end(study: Problem, name: str) -> str:
     ends = study.file.factor[study.factors.index(name)].allowed
     if ends is None:
         return "at the edge of the design region; set allowed = [low, high] to search further"
-    return (
-        f"at an end of allowed = {ends}"
-        if study.file.adaptive.extend
-        else "at the edge of the design region, which extend = false fixes"
-    )
+    if study.file.adaptive.extend:
+        return f"at an end of allowed = {ends}"
+    return "at the edge of the design region, which extend = false fixes"
 
 
 def trust_sentence(study: Problem, adaptive: Adaptive) -> str:

@@ -343,7 +343,8 @@ RUN_MARKS = {
 }
 AREA = 7.0  # of a run of one replicate [pt²]
 # Size of a picture with a legend beneath, where no point lies, and letters in a line of it.
-HIGH, BOTTOM, LETTERS = 338.0, 112.0, 56
+WITH_LEGEND: dict[str, Any] = {"height": 338.0, "bottom_margin": 112.0}
+LETTERS = 56
 HALF = 24  # letters in a line of one of two columns
 BENEATH: dict[str, Any] = {"loc": "upper center", "bbox_to_anchor": (0.45, -0.17)}
 
@@ -393,16 +394,12 @@ def search_stills(summary: Summary, adaptive: SearchResult) -> list[Still]:
     ends = f"{lines[0].reached[0]:.3f} to {lines[0].reached[-1]:.3f} in {lines[0].runs[-1]:.0f} runs"
     words = f"Hypervolume of the search rises from {ends}"
     first, *others = summary.asked.columns
+    above = f"{sum(map(len, spent.values()))} runs over {label(first)} and"
     places = [
-        Still(
-            f"{sum(map(len, spent.values()))} runs over {label(first)} and {label(other)}",
-            partial(_where, spent, summary.pick, first, other),
-            height=HIGH,
-            bottom_margin=BOTTOM,
-        )
+        Still(f"{above} {label(other)}", partial(_where, spent, summary.pick, first, other), **WITH_LEGEND)
         for other in others
     ]
-    return [Still(words, partial(_progress, lines), height=HIGH, bottom_margin=BOTTOM), *places]
+    return [Still(words, partial(_progress, lines), **WITH_LEGEND), *places]
 
 
 def _progress(lines: Sequence[Curve], axis: "Axes") -> None:
@@ -433,15 +430,8 @@ def _where(spent: Runs, pick: Mapping[str, float], first: str, second: str, axis
             x, y, sizes, COLOURS[colour], marker=mark, edgecolors=COLOURS["paper"], linewidths=0.8, label=why
         )
         name_marks(points, why, [f"{why}, {count} replicates" for _, count in runs])
-    (star,) = axis.plot(
-        pick[first],
-        pick[second],
-        "*",
-        color=COLOURS["vermilion"],
-        markeredgecolor=COLOURS["paper"],
-        markersize=15,
-        label="selected design",
-    )
+    look: dict[str, Any] = {"color": COLOURS["vermilion"], "markeredgecolor": COLOURS["paper"], "markersize": 15}
+    (star,) = axis.plot(pick[first], pick[second], "*", **look, label="selected design")
     name_marks(star, "pick", ["selected design"])
     axis.set(xlabel=label(first), ylabel=label(second))
     axis.legend(ncol=3, markerscale=0.8, title="size: replicates", title_fontsize=SMALL, **BENEATH)

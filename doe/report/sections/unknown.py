@@ -71,13 +71,8 @@ def share_sheet(outputs: Iterable[OutputRange]) -> Sheet[InputShare]:
         for output in outputs
         for key, share in output.shares.items()
     ]
-    return Sheet(
-        "",
-        columns_of(InputShare),
-        rows,
-        file="shares.csv",
-        content="The share of each input in the variance of each output.",
-    )
+    content = "The share of each input in the variance of each output."
+    return Sheet("", columns_of(InputShare), rows, file="shares.csv", content=content)
 
 
 def input_sheet(inputs: Iterable[UnknownInput], *columns: Column[UnknownInput]) -> Sheet[UnknownInput]:
