@@ -370,10 +370,15 @@ def _collinearity(fit: Fit) -> str:
     )
 
 
-def _lack_of_fit(fit: Fit) -> str:
+def lack_of_fit_tests(fit: Fit) -> dict[str, float]:
+    """Probability of lack of fit by each test that the runs allow."""
     known = fit.known_variance
     tests = {"pure error": fit.lack_of_fit.p, "the known variance": None if known is None or known.refuted else known.p}
-    values = {what: p for what, p in tests.items() if p is not None}
+    return {what: p for what, p in tests.items() if p is not None}
+
+
+def _lack_of_fit(fit: Fit) -> str:
+    values = lack_of_fit_tests(fit)
     if not values and fit.pure_error.df == 0:
         return "lack of fit cannot be tested, because no run is replicated; add centre replicates."
     if not values and fit.lack_of_fit.df == 0:

@@ -20,6 +20,7 @@ from doe.clearance import Simulations
 from doe.duty import Run, scenes_of
 from doe.pareto.front import NOISE_DRAWS, Samples, SimulatedFront, noisy_hypervolume
 from doe.pareto.search import InfeasibleError, hypervolume, non_dominated
+from doe.response_surface.statistics import lack_of_fit_tests
 from doe.running.store import Failure, grouped
 from doe.workflow.confirmation import Limit
 from doe.workflow.front import named_faults
@@ -196,9 +197,11 @@ def border_of(study: Problem) -> Border | None:
 
 
 def advice(study: Problem) -> list[str]:
-    """Advice to search adaptively, for surfaces with significant lack of fit; else none."""
+    """Advice to search adaptively, for surfaces whose lack of fit is significant by every test; else none."""
     lacking = [
-        surface.name for surface in study.surfaces if (p := surface.lack_of_fit.p) is not None and p < SIGNIFICANT
+        surface.name
+        for surface in study.surfaces
+        if (tests := lack_of_fit_tests(surface)) and max(tests.values()) < SIGNIFICANT
     ]
     if not lacking:
         return []

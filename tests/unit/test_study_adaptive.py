@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import sqlite3
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from doe import clearance
 from doe.clearance import Simulations
 from doe.report.files import write
 from doe.report.sections.front import spent_sentence
+from doe.response_surface.statistics import describe
 from doe.running.store import STORE, Store
 from doe.workflow.adaptive import advice, border_of, check_adaptive, compare_fronts, find_adaptive, region_in_units
 from doe.workflow.front_record import SearchResult
@@ -280,3 +282,13 @@ def test_advice_where_surfaces_miss_more_than_noise():
     assert (
         advice(study.with_surfaces(fit_surfaces(study, type(runs)(runs.coded, runs.actual, smooth, runs.errors)))) == []
     )
+    # One test sees the bend, the other does not: the surface is in doubt, as its own sentence says, and the front is not "biased".
+    slightly = smooth + 0.2 * np.sin(3.0 * runs.coded[:, :1])
+    doubtful = replace(runs, values=slightly, errors=np.full_like(bent, 0.2), replicates=np.full(bent.shape, 8))
+    surfaces = fit_surfaces(study, doubtful)
+    assert [any("lack of fit is in doubt" in text for text in describe(surface)) for surface in surfaces] == [
+        True,
+        False,
+        True,
+    ]
+    assert surfaces[2].lack_of_fit.p < 0.01 and advice(study.with_surfaces(surfaces)) == []
