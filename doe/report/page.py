@@ -24,7 +24,7 @@ from doe.report.summary import Summary, readable
 from doe.workflow.front_record import EstimatedPoint, Point, RobustPoint
 from doe.workflow.problem import Asked, Factor, Response
 from rbdyn.base import html
-from rbdyn.base.blocks import Block, Bullets, Remarks, Section, Table, Verdict, Widget
+from rbdyn.base.blocks import Block, Bullets, Paragraph, Remarks, Section, Table, Verdict, Widget, has_content
 from rbdyn.base.html import identity_section, page
 from rbdyn.base.words import label, quantity, rounded_down, shown
 
@@ -53,7 +53,11 @@ def html_report(summary: Summary, motion: Motions = MappingProxyType({})) -> str
     widgets = {block.name for section in chapters for block in section.blocks if isinstance(block, Widget)}
     data = f'<script type="application/json" id="data">{_json(page_data(summary, motion))}</script>'
     scripts = [data, *(f"<script>\n{script}</script>" for script in _scripts(widgets))]
-    opening = "".join(map(html.render, readable([Verdict(tuple(summary.notes))], summary.asked)))
+    warnings = sum(
+        isinstance(block, Paragraph) and block.role == "warning" for block in chapters[0].blocks if has_content(block)
+    )
+    verdict = Verdict(tuple(summary.notes), warnings=warnings)
+    opening = "".join(map(html.render, readable([verdict], summary.asked)))
     window = f"{title(summary)}: {summary.identity.title}"
     document = NO_SCRIPTS + opening
     return page(window, title(summary), chapters, lambda name: text(f"{name}.html"), document, "\n".join(scripts))

@@ -301,6 +301,7 @@ def test_the_verdict_comes_first_and_every_warning_has_a_number():
     assert len(words(said)) <= 210
     page = html_report(study)
     assert record["statement"] in page and "meets every limit" in page
+    assert "No danger found; 3 warnings" in page
     quiet = terminal.text(blocks(study), Detail.LEAST)
     assert "Warning: Do not choose" in quiet and "Warnings" not in quiet
 
