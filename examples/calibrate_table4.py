@@ -35,9 +35,9 @@ from doe.unknown.decision import wilson
 from doe.workflow.calibration import Question, find_calibration, read_question
 from doe.workflow.identification import Evidence
 from doe.workflow.status import scene_identity
+from rbdyn.base.faults import put_key
 from rbdyn.base.terminal import show
 from rbdyn.scene import Scene
-from rbdyn.scene.unknown import put
 
 HERE = Path(__file__).parent
 FACTORS = {
@@ -135,7 +135,7 @@ def survival(found: Evidence, simulations: Simulations) -> list[str]:
     for design in ((0.02, 0.15, 0.3), PICK):
         tables = copy.deepcopy(found.case.data)
         for key, value in zip(FACTORS.values(), design, strict=True):
-            put(tables, key, value)
+            put_key(tables, key, value, key)
         sets = replace(found.case, data=tables).scenes(found.inputs, values, SEEDS)
         scenes = [each for each in sets if isinstance(each, Scene)]
         labels = [f"posterior pair {place}" for place in range(len(scenes))]

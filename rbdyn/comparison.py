@@ -7,7 +7,7 @@ beyond the accuracy of the solver counts.
 
 import json
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from os import PathLike
 from pathlib import Path
@@ -17,7 +17,7 @@ from rbdyn.base.blocks import Column, Sheet, columns_of, within
 from rbdyn.base.estimate import errors_of_differences
 from rbdyn.base.faults import InputError, RunError, read_text, refuse
 from rbdyn.base.notes import Level, Note, Notes, merged
-from rbdyn.base.records import Record, finite, shown, written
+from rbdyn.base.records import Record, finite, leaves, shown, written
 from rbdyn.base.words import (
     Brief,
     Figure,
@@ -238,8 +238,8 @@ def comparison(a: Any, b: Any, name_a: str = "A", name_b: str = "B") -> Comparis
         b=sides[1],
         inputs=different_inputs(a.scene, b.scene),
         figures=differences(*({key: result[key] for key in result if key not in repeats} for result in figures)),
-        parts=differences(_parts(a), _parts(b)),
-        notes=_notes(a, b),
+        parts=differences(*(getattr(result, "part_figures", None) or {} for result in (a, b))),
+        notes=tuple(_notes(a, b)),
     )
 
 
@@ -340,42 +340,33 @@ def _figures(result: Any) -> dict[str, Quantity]:
     return {name: Quantity(value, 0.0, 0.0, 1.0) for name, value in result.figures.items()}
 
 
-def _parts(result: Any) -> dict[str, Quantity]:
-    """Figures of the parts of a roller bearing: losses, clearances, contacts."""
-    return (result.part_figures or {}) if isinstance(result, SimulationResult) else {}
-
-
-def _notes(a: Any, b: Any) -> Notes:
+def _notes(a: Any, b: Any) -> Iterator[Note]:
     """Dangers and warnings of both, and what makes figures of one unlike those of the other besides the inputs."""
-    found = [*merged({"A": a.notes or (), "B": b.notes or ()}, "of {}", Level.WARNING)]
+    yield from merged({"A": a.notes or (), "B": b.notes or ()}, "of {}", Level.WARNING)
     other = [name for name in a.versions if a.versions[name] != b.versions.get(name)]
     if other:
         change = ", ".join(f"{name} {a.versions[name]} and {b.versions.get(name, 'unknown')}" for name in other)
-        found.append(Note("versions", f"A and B were computed by other versions, which differ too: {change}"))
+        yield Note("versions", f"A and B were computed by other versions, which differ too: {change}")
     windows = [getattr(result, "impact_window_turns", None) for result in (a, b)]
     if windows[0] != windows[1]:
-        found.append(
-            Note(
-                "windows",
-                f"the impact force is the largest in {windows[0]:g} shaft turns of A and in {windows[1]:g} of B, so that it differs "
-                "for that alone; make numerics.impact_window_turns and the turns alike",
-            )
+        yield Note(
+            "windows",
+            f"the impact force is the largest in {windows[0]:g} shaft turns of A and in {windows[1]:g} of B, so that it differs "
+            "for that alone; make numerics.impact_window_turns and the turns alike",
         )
     replicates = [getattr(result, "replicates", ENOUGH) for result in (a, b)]
     if min(replicates) < ENOUGH:
-        found.append(
-            Note(
-                "few-replicates",
-                f"intervals rest on {replicates[0]} and {replicates[1]} replicates; with {ENOUGH} of each (--replicates) they are far "
-                "narrower",
-            )
+        yield Note(
+            "few-replicates",
+            f"intervals rest on {replicates[0]} and {replicates[1]} replicates; with {ENOUGH} of each (--replicates) they are far "
+            "narrower",
         )
-    return tuple(found)
 
 
 def different_inputs(a: Mapping[str, Any], b: Mapping[str, Any]) -> tuple[Input, ...]:
     """Keys of two resolved scenes with other values, in their order."""
-    sides = [_flat(a), _flat(b)]
+    # None counts as no value.
+    sides = [{key: value for key, value in leaves(scene) if value is not None} for scene in (a, b)]
     found = []
     for key in dict.fromkeys([*sides[0], *sides[1]]):
         default = default_of(key, Scene if "cage" in a else BallScene)
@@ -388,14 +379,3 @@ def different_inputs(a: Mapping[str, Any], b: Mapping[str, Any]) -> tuple[Input,
             defaults = [value is not None and value == default for value in (ours, theirs)]
             found.append(Input(key, ours, theirs, *defaults))
     return tuple(found)
-
-
-def _flat(tables: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
-    """Values of nested tables by their dotted keys; None counts as no value."""
-    flat: dict[str, Any] = {}
-    for key, value in tables.items():
-        if isinstance(value, Mapping):
-            flat |= _flat(value, f"{prefix}{key}.")
-        elif value is not None:
-            flat[f"{prefix}{key}"] = value
-    return flat

@@ -27,7 +27,7 @@ from doe.workflow.identification import BEFORE, Calibration, Design, Evidence, i
 from doe.workflow.input_sets import Case, check_holes, impossible, laws_of, outcomes, tables_of
 from doe.workflow.rig import MOST_CONDITIONS, SPEED, Rig, read_rig
 from rbdyn.base.arrays import Array, one_thread
-from rbdyn.base.faults import Claims, InputError, RunError, key_path, refuse
+from rbdyn.base.faults import Claims, InputError, RunError, key_path, put_key, refuse
 from rbdyn.base.files import code_version, digest_of
 from rbdyn.base.notes import Note, Notes
 from rbdyn.base.words import NORMAL, counted
@@ -35,7 +35,7 @@ from rbdyn.result import TEMPERATURES, SimulationResult
 from rbdyn.scene import Scene
 from rbdyn.scene.thermal import first_guess_faults
 from rbdyn.scene.uncertain import RUN_KEYS, Law, Uncertain, documented
-from rbdyn.scene.unknown import Input, put
+from rbdyn.scene.unknown import Input
 
 
 class Question(NamedTuple):
@@ -181,7 +181,7 @@ def cases_of(case: Case, rig: Rig) -> list[Case]:
         tables, scene_of = copy.deepcopy(case.data), f"{rig.path}: row {row}"
         try:
             for key, value in keys.items():
-                put(tables, key, list(value) if isinstance(value, tuple) else value)
+                put_key(tables, key, list(value) if isinstance(value, tuple) else value, scene_of)
             scene = Scene.from_dict(tables, scene_of)
             cases.append(replace(case, data=tables, scene=scene, source=scene_of, home=scene_of))
         except InputError as error:

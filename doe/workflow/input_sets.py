@@ -39,7 +39,7 @@ from rbdyn.base.words import shown
 from rbdyn.scene import Scene, rollers_only
 from rbdyn.scene.keys import key_values, unknown_keys
 from rbdyn.scene.uncertain import MARKING, Law, Sampled, Uncertain
-from rbdyn.scene.unknown import Input, documented_of, inputs_of, is_number, put, value_of, with_values
+from rbdyn.scene.unknown import Input, documented_of, inputs_of, is_number, value_of, with_values
 
 HOLES = 0.05  # share of input sets that may be impossible or fail
 SCREENING_SEEDS = 500_000
@@ -134,7 +134,7 @@ class Case(Record):
                 tables = copy.deepcopy(shared)
                 for override in set_overrides[number] if set_overrides else ():
                     set_key(tables, override)
-                put(tables, "numerics.seed", seed + number)
+                tables.setdefault("numerics", {})["seed"] = seed + number
                 varied = with_values(tables, self.source, by_key, {**row, **tied_values})
                 scenes.append(Scene.from_dict(varied, self.source))
             except InputError as error:

@@ -10,7 +10,7 @@ import csv
 import functools
 import math
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import MISSING, Field, dataclass, field, fields
 from pathlib import Path
@@ -117,9 +117,15 @@ class Record:
 
 
 class OverPoints:
-    """What results over ``points`` have in common: a point that failed has another ``status`` than "ok"."""
+    """What results over ``points`` have in common: a ``sheet`` with a row a point; one that failed has another ``status`` than "ok"."""
 
     points: Any
+    sheet: Any
+
+    def table(self) -> "pd.DataFrame":
+        """The sheet for pandas."""
+        frame: pd.DataFrame = self.sheet.frame
+        return frame
 
     @property
     def failed(self) -> list[Any]:
@@ -146,6 +152,15 @@ def plain(value: Any) -> Any:
     if isinstance(value, list | tuple):
         return [plain(item) for item in value]
     return value.tolist() if hasattr(value, "tolist") else value
+
+
+def leaves(tables: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    """Dotted keys of nested tables with their values."""
+    for key, value in tables.items():
+        if isinstance(value, Mapping):
+            yield from leaves(value, f"{prefix}{key}.")
+        else:
+            yield f"{prefix}{key}", value
 
 
 def finite(value: float) -> float | None:

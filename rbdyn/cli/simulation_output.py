@@ -3,7 +3,7 @@
 A duty is shown by its points with speed and load, and the life there and over the duty.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -465,9 +465,8 @@ def map_duty(scene: Scene, path: Path, speeds_rpm: Sequence[float], loads_N: Seq
 
 def _notes(
     points: Sequence[DutyPoint], scenes: Sequence[Scene], speeds: Sequence[float], loads: Sequence[float]
-) -> Notes:
+) -> Iterator[Note]:
     """Notes on points off the map, and on keys that the map keeps at the values of the scene."""
-    notes = list[Note]()
     for point, scene in zip(points, scenes, strict=True):
         speed, load = _place(scene)
         if not (speeds[0] <= speed <= speeds[-1] and loads[0] <= load <= loads[-1]):
@@ -475,12 +474,11 @@ def _notes(
                 f"duty {point.name!r}: {speed:g} rpm and {load:g} N are off the map, so its mark is at the edge; widen --speed "
                 "or --load"
             )
-            notes.append(Note("off-map", sentence))
+            yield Note("off-map", sentence)
         others = [".".join(path) for text in point.set if (path := key_path(text)) and ".".join(path) not in AXES]
         if others:
             sentence = f"duty {point.name!r}: sets {', '.join(others)} too, which the map keeps at the scene's values"
-            notes.append(Note("off-map", sentence))
-    return tuple(notes)
+            yield Note("off-map", sentence)
 
 
 def _place(scene: Scene) -> tuple[float, float]:

@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from rbdyn.base.blocks import Column, Sheet
 from rbdyn.base.estimate import errors_of_differences
@@ -36,10 +36,6 @@ from rbdyn.scene.duty import AMBIENT, DutyPoint, duty_scenes, read_duty, shares_
 from rbdyn.scene.thermal import simulated_scene
 from rbdyn.thermal.network import NODES
 from rbdyn.verdict.orbits import CageVerdict
-
-if TYPE_CHECKING:
-    import pandas as pd
-
 
 # By figure, how much worse a larger value is; none of figures of which neither end is bad.
 BADNESS: dict[str, Callable[[float], float]] = {"largest": float, "least": lambda value: -value, "farthest from 0": abs}
@@ -106,10 +102,6 @@ class DutySimulation(OverPoints, SavedRecord, kw_only=True):
     def sheet(self) -> Sheet[SimulatedPoint]:
         """A row a point; figures with their 95 % errors, units in the names."""
         return points_sheet(self.points, dict.fromkeys(name for point in self.points for name in point.figures))
-
-    def table(self) -> "pd.DataFrame":
-        """The sheet for pandas."""
-        return self.sheet.frame
 
 
 # Columns of points that a machine comes to from a stated state.

@@ -9,7 +9,7 @@ last half counts. Companions run just as far. Nothing depends on the clock or on
 import math
 import time
 from array import array
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from typing import NamedTuple, Protocol
@@ -429,17 +429,16 @@ def fits(scene: Scene, turns: float) -> bool:
     return batches_of(scene).count(turns) <= scene.numerics.most_batches
 
 
-def length_notes(scene: Scene, runs: Sequence[Replicate], stage: Stage, since: int) -> Notes:
+def length_notes(scene: Scene, runs: Sequence[Replicate], stage: Stage, since: int) -> Iterator[Note]:
     """Notes on the length of the runs and on the turns that count."""
-    numerics, turn_s = scene.numerics, scene.turn_s
-    notes, counted = list[Note](), runs[0].duration / turn_s
+    numerics, turn_s, counted = scene.numerics, scene.turn_s, runs[0].duration / scene.turn_s
     if stage.lengthened:
         dropped = float(runs[0].durations[: stage.first].sum()) / turn_s
         sentence = (
             f"length: results drifted, so each replicate was extended from {numerics.warm_up_turns + numerics.turns:.4g} to "
             f"{dropped + counted:.4g} shaft turns. The last {counted:.4g} count. Set numerics.extend = false to prevent this"
         )
-        notes.append(Note("lengthened", sentence))
+        yield Note("lengthened", sentence)
     if scene.operation.schedule is None and not settled(runs, since):
         fix = (
             "Raise numerics.extend_limit" if scene.extends else "Lengthen numerics.turns or set numerics.extend = true"
@@ -450,5 +449,4 @@ def length_notes(scene: Scene, runs: Sequence[Replicate], stage: Stage, since: i
             f"transient: results still drift over the {counted:.4g} counted turns, or differ by how replicates start, so no "
             f"statistical error is known. {fix}"
         )
-        notes.append(Note("drift", sentence))
-    return tuple(notes)
+        yield Note("drift", sentence)

@@ -1,7 +1,7 @@
 """Replicates of a scene, gathered with error bars."""
 
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -237,22 +237,20 @@ def _balance_notes(scene: Scene, power_gap: float) -> Notes:
     return (Note("power-balance", sentence),)
 
 
-def _model_notes(scene: Scene) -> Notes:
+def _model_notes(scene: Scene) -> Iterator[Note]:
     """What the chosen laws miss."""
-    notes = list[Note]()
     if cutoff := scene.numerics.whirl_cutoff_hz:
         sentence = f"whirl deviation ratio: it counts only motion below {cutoff:g} Hz (numerics.whirl_cutoff_hz)"
-        notes.append(Note("definition", sentence))
+        yield Note("definition", sentence)
     if scene.traction.model == "four_constant":
         sentence = (
             "traction: one curve is used for all loads. It overestimates traction on lightly loaded rollers and so underestimates "
             "skidding. Use traction.model = 'thermal_newtonian', or 'limiting_shear' for an oil without its constants"
         )
-        notes.append(Note("left-out", sentence))
+        yield Note("left-out", sentence)
     if scene.traction.model == "thermal_newtonian" and scene.lubricant.viscosity_mPas is not None:
         sentence = (
             "traction: it follows the oil and its temperature, not lubricant.viscosity_mPas, which the films use; choose "
             "traction.rheology_oil to suit it"
         )
-        notes.append(Note("remark", sentence))
-    return tuple(notes)
+        yield Note("remark", sentence)

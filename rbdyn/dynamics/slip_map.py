@@ -9,7 +9,7 @@ import time
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import Any, cast
 
 import numpy as np
 
@@ -37,9 +37,6 @@ from rbdyn.scene import Scene
 from rbdyn.scene.duty import AXES
 from rbdyn.scene.thermal import first_guess_faults
 from rbdyn.verdict.orbits import CageVerdict
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 FORMAT = "rbdyn.map/1"
 RACES = ("inner", "outer")
@@ -123,9 +120,10 @@ class SlipMap(OverPoints, Record):
             for code, (note, point) in last.items()
         )
 
-    def table(self) -> "pd.DataFrame":
+    @property
+    def sheet(self) -> Sheet[Point]:
         """A row a point; figures with their 95 % errors."""
-        return map_sheet(self.points).frame
+        return map_sheet(self.points)
 
     @property
     def columns(self) -> tuple[float, ...]:

@@ -8,7 +8,7 @@ shaft, are those of as many courses.
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any, NamedTuple
@@ -295,7 +295,7 @@ def _result(
         moments=tuple(_record(each) for each in simulated),
         path=StartPath(**_columns(machine, law, path, simulated, ranges.bands)),
     )
-    return start, _notes(machine, start, distance)
+    return start, tuple(_notes(machine, start, distance))
 
 
 def _figures(machine: Machine, rows: warming.Warming, columns: Mapping[str, Array]) -> dict[str, Array]:
@@ -487,14 +487,13 @@ def _failure_notes(failures: Sequence[Failure]) -> Notes:
     return (Note("lost-runs", sentence),)
 
 
-def _notes(machine: Machine, start: StartResult, distance: float) -> Notes:
-    notes = list(status_notes(f"{start.status}: start: {start.reason}" if start.reason else start.status))
-    notes += start.lost_clearance if machine.scene.bearing.radial_clearance > 0.0 else ()
-    notes += start.seizure_notes("a part")
+def _notes(machine: Machine, start: StartResult, distance: float) -> Iterator[Note]:
+    yield from status_notes(f"{start.status}: start: {start.reason}" if start.reason else start.status)
+    yield from start.lost_clearance if machine.scene.bearing.radial_clearance > 0.0 else ()
+    yield from start.seizure_notes("a part")
     if distance > FAR:
         sentence = (
             f"start: after {MOST_SIMULATIONS} short simulations some moments are {distance:.2g} times as far apart as intended; the errors "
             "of its results include that"
         )
-        notes.append(Note("numerical-error", sentence))
-    return tuple(notes)
+        yield Note("numerical-error", sentence)

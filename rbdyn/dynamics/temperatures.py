@@ -12,7 +12,7 @@ far wider than these errors, follow from 256 sets of the model of the search wit
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import NamedTuple
@@ -492,9 +492,11 @@ def _new(notes: Notes, scene: Scene, hot: Scene, status: str) -> list[Note]:
     return [note for note in notes if note not in computed and note.code != status]
 
 
-def _notes(scene: Scene, hot: Scene, status: str, reason: str, ranges: Ranges) -> Notes:
+def _notes(scene: Scene, hot: Scene, status: str, reason: str, ranges: Ranges) -> Iterator[Note]:
     """Notes of the heat balance: its verdict, what its inputs leave open, and where the oil fraction is a guess."""
-    notes = [*status_notes(f"{status}: {reason}"), *ranges.notes]
+    yield from status_notes(f"{status}: {reason}")
+    yield from ranges.notes
     thermal, mounting = scene.thermal, scene.mounting
     assert thermal is not None and mounting is not None
-    return (*notes, *heat_notes(thermal, scene.lubricant, mounting, heat.ring_width(scene)), *heat.flow_notes(hot))
+    yield from heat_notes(thermal, scene.lubricant, mounting, heat.ring_width(scene))
+    yield from heat.flow_notes(hot)

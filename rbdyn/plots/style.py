@@ -26,7 +26,7 @@ BLUE, ORANGE, GREEN, VERMILION, SKY, PURPLE = (
 )  # fmt: skip
 GREY = "#555555"
 PNG = {"compress_level": 3}  # as small as by the level 6 of Pillow, in two thirds of the time
-OUTER, INNER, POCKET = BLUE, VERMILION, GREEN
+OUTER, INNER = BLUE, VERMILION
 
 # Places of a label next to the end of its line: offset [points] and alignment, best first.
 SIDES: tuple[tuple[float, Literal["left", "center", "right"]], ...] = ((0.0, "center"), (7.0, "left"), (-7.0, "right"))

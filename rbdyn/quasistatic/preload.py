@@ -7,7 +7,7 @@ point of the scan, and a note states an optimum at an end of the range.
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -114,11 +114,10 @@ def scan(case_at: Callable[[float], Case], values: Sequence[float], name: str, u
 
     least = refined(lambda point: point.peak_pressure)
     longest = refined(lambda point: -point.million_turns)
-    return Scan(tuple(points), least, longest, _notes(balanced, least, longest, name, unit, scale))
+    return Scan(tuple(points), least, longest, tuple(_notes(balanced, least, longest, name, unit, scale)))
 
 
-def _notes(points: Sequence[Point], least: Point, longest: Point, name: str, unit: str, scale: float) -> Notes:
-    notes = list[Note]()
+def _notes(points: Sequence[Point], least: Point, longest: Point, name: str, unit: str, scale: float) -> Iterator[Note]:
     span = points[-1].value - points[0].value
     for goal, point in (("least peak stress", least), ("longest life", longest)):
         for end, word in ((points[0].value, "lower"), (points[-1].value, "upper")):
@@ -127,7 +126,7 @@ def _notes(points: Sequence[Point], least: Point, longest: Point, name: str, uni
                     f"{goal}: it is at the {word} end of the range, {name} {scale * end:.4g} {unit}, without an optimum "
                     "inside; widen the range or accept the end"
                 )
-                notes.append(Note("optimum", sentence))
+                yield Note("optimum", sentence)
     loss = 1.0 - least.million_turns / longest.million_turns
     rise = longest.peak_pressure / least.peak_pressure - 1.0
     apart = abs(least.value - longest.value) > SAME_PLACE * span
@@ -136,8 +135,7 @@ def _notes(points: Sequence[Point], least: Point, longest: Point, name: str, uni
             f"the optima differ: {name} {scale * least.value:.4g} {unit} for least stress costs {100.0 * loss:.3g} % of the "
             f"life, {scale * longest.value:.4g} {unit} for longest life {100.0 * rise:.3g} % more stress"
         )
-        notes.append(Note("optimum", sentence))
-    return tuple(notes)
+        yield Note("optimum", sentence)
 
 
 def over_preload(

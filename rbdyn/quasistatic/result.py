@@ -172,7 +172,6 @@ def remarks(solution: Solution, rating: Rating, name: str = "") -> list[Remark]:
     steep, turned = steepest > math.degrees(STEEPEST), int(np.sum(touching & (angle < 0.0)))
     needed, (inner, outer) = needed_friction(solution, rating), pressures(solution, rating).values()
     climbs = {race: _climbing(solution, rating, race) for race in RACES}
-    very_steep = bool(np.abs(solution.inner_angle[touching]).max(initial=0.0) > STEEPEST)
     # fmt: off
     listed = [
         ("loose-ring", "unloaded", clear == size,
@@ -191,7 +190,7 @@ def remarks(solution: Solution, rating: Rating, name: str = "") -> list[Remark]:
         ("gyroscopic-slip", "gyroscopic slip", needed > OILED_FRICTION,
             f"the gyroscopic moment needs a friction coefficient of {needed:.2f}, more than oil gives: the balls slip "
             "about its axis; raise the load or reduce the speed"),
-        *(("shoulder", f"{race} shoulder", climbs and not very_steep, words) for race, (climbs, words) in climbs.items()),
+        *(("shoulder", f"{race} shoulder", climbs and not steep, words) for race, (climbs, words) in climbs.items()),
     ]
     # fmt: on
     return [Remark(row + word, Note(code, row + sentence)) for code, word, holds, sentence in listed if holds]

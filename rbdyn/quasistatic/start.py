@@ -6,7 +6,7 @@ heat is interpolated between moments of this course and, in a second round, of t
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial
@@ -235,7 +235,7 @@ def _start(scene: SingleRowScene, search: Search, ranged: bool) -> tuple[StartRe
         moments=(),
         path=StartPath(**columns),
     )
-    return start, _notes(path, start)
+    return start, tuple(_notes(path, start))
 
 
 def _path(machine: Machine, tolerance: float) -> Path:
@@ -458,10 +458,9 @@ def _loads_of_sets(
     }, impossible
 
 
-def _notes(path: Path, start: StartResult) -> Notes:
-    notes = list(status_notes(f"{start.status}: start: {start.reason}" if start.reason else start.status))
-    notes += start.seizure_notes("the bearing")
+def _notes(path: Path, start: StartResult) -> Iterator[Note]:
+    yield from status_notes(f"{start.status}: start: {start.reason}" if start.reason else start.status)
+    yield from start.seizure_notes("the bearing")
     if path.here[0].heat.scene.bearing.kind == "deep_groove_ball":
-        notes += start.lost_clearance
-    starved = starvation_note(path.here[0].heat.scene, f"start at {path.rows.temperatures[0, OIL]:.4g} C")
-    return (*notes, *starved)
+        yield from start.lost_clearance
+    yield from starvation_note(path.here[0].heat.scene, f"start at {path.rows.temperatures[0, OIL]:.4g} C")

@@ -13,7 +13,7 @@ angular contact bearings relieve a radial growth by their axial load, which the 
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any, NamedTuple
@@ -422,7 +422,7 @@ def _record(scene: SingleRowScene, search: Search, ranges: Ranges, status: str, 
     )
 
 
-def _notes(scene: SingleRowScene, found: Heat, ranges: Ranges) -> Notes:
+def _notes(scene: SingleRowScene, found: Heat, ranges: Ranges) -> Iterator[Note]:
     """What the heat balance leaves open."""
     kind, (inner, outer), mounting = scene.bearing.kind, scene.operation.speeds, scene.mounting
     thermal, lubricant = scene.thermal, scene.lubricant
@@ -432,7 +432,7 @@ def _notes(scene: SingleRowScene, found: Heat, ranges: Ranges) -> Notes:
         f"temperatures: their heat is SKF's friction model, {LEVELS[kind]} times the heat of ISO 15312 at reference speed, which no "
         "range includes"
     )
-    notes = [Note("left-out", level)]
+    yield Note("left-out", level)
     fast = abs(inner - outer) * 0.5 * (mounting.bore + mounting.outside_diameter)
     if fast > FASTEST[kind]:
         sentence = (
@@ -440,10 +440,10 @@ def _notes(scene: SingleRowScene, found: Heat, ranges: Ranges) -> Notes:
             "friction was not verified"
             + ("; at 1.4 million it was 2.9 times the loss in NASA TP-2275" if kind == "angular_contact_ball" else "")
         )
-        notes.append(Note("unverified", sentence))
-    notes += starvation_note(found.scene, "temperatures")
-    notes += ranges.notes
-    return (*notes, *heat_notes(thermal, lubricant, mounting, mounting.width))
+        yield Note("unverified", sentence)
+    yield from starvation_note(found.scene, "temperatures")
+    yield from ranges.notes
+    yield from heat_notes(thermal, lubricant, mounting, mounting.width)
 
 
 def starvation_note(hot: SingleRowScene, subject: str) -> Notes:

@@ -159,18 +159,12 @@ def _classes(module: str) -> dict[str, ast.ClassDef]:
 
 def _models(roots: Any) -> list[type[BaseModel]]:
     """The models and all models in their fields."""
-    models: dict[type[BaseModel], None] = {}
-    waiting: list[Any] = list(roots)
-    while waiting:
-        kind = waiting.pop()
-        if isinstance(kind, type) and issubclass(kind, BaseModel):
-            if kind not in models:
-                models[kind] = None
-                waiting += [field.annotation for field in kind.model_fields.values()]
-                waiting.append(kind.__annotations__.get("__pydantic_extra__"))
-        else:
-            waiting += getattr(kind, "__args__", ())
-    return list(models)
+    models = list[type[BaseModel]](roots)
+    for model in models:
+        fields = [field.annotation for field in model.model_fields.values()]
+        inner = map(_inner_models, [*fields, model.__annotations__.get("__pydantic_extra__")])
+        models += dict.fromkeys(found for group in inner for found in group if found not in models)
+    return models
 
 
 def _target(node: Mapping[str, Any]) -> str:

@@ -1,7 +1,7 @@
 """Notes on suspicious values of a scene: a probable slip of the unit, dimensions that contradict the stated designation."""
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 
 from rbdyn.base.faults import RPM
 from rbdyn.base.notes import Note, Notes
@@ -157,13 +157,12 @@ FAST_LISTED, FAST_USUAL, FASTEST = (1.0, 2.0), 2.0, 3.0e3 * RPM
 
 def clearance_notes(
     clearances: Mapping[str, OperatingClearance | None], floors: Mapping[str, float] | None = None
-) -> Notes:
+) -> Iterator[Note]:
     """Notes on diametral ``clearances`` [m], by name, that are negative, nearly lost or, of a cage, mostly lost in operation.
 
     ``floors`` [m]: what must be left of each, minus infinity of one that may become a preload; a tenth of the drawn clearance where
     there is none.
     """
-    notes = []
     for name, play in clearances.items():
         if play is None:
             continue
@@ -177,8 +176,7 @@ def clearance_notes(
             f"{1e6 * play.fit:+.1f}, temperature {1e6 * play.temperature:+.1f}, rotation {1e6 * play.rotation:+.1f} um; {effect}widen it or "
             "check the temperatures"
         )
-        notes.append(Note("seizure" if lost else "clearance", sentence))
-    return tuple(notes)
+        yield Note("seizure" if lost else "clearance", sentence)
 
 
 def speed_notes(speed: float, pitch_diameter: float, reference: float | None, usual: float = REFERENCE_SPEED) -> Notes:

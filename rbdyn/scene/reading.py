@@ -1,12 +1,12 @@
 """Reading of scenes from files and tables, and changed copies of a scene."""
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from copy import deepcopy
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self, TypeVar, cast
 
 from rbdyn.base import faults
-from rbdyn.base.records import plain
+from rbdyn.base.records import leaves, plain
 from rbdyn.base.words import html_table
 
 T = TypeVar("T")
@@ -106,7 +106,7 @@ class SceneFile(faults.Consistent, faults.Sparse, metaclass=Validation):
 
     def _repr_html_(self) -> str:
         """Table of the stated keys for a notebook."""
-        rows = ((name, ", ".join(_leaves(table))) for name, table in self._tables.items())
+        rows = ((name, ", ".join(map(_stated, leaves(table)))) for name, table in self._tables.items())
         return html_table(repr(self).strip("<>"), ("table", "stated keys"), rows)
 
     @property
@@ -130,11 +130,8 @@ def _assignments(overrides: Any) -> list[str]:
     raise faults.InputError(f'overrides = {name}: must be a list such as ["cage.mass_g=50"]')
 
 
-def _leaves(table: Any, prefix: str = "") -> Iterator[str]:
-    """'key = value' for each key of nested tables; of long lists only the number of values."""
-    for key, value in table.items():
-        if isinstance(value, Mapping):
-            yield from _leaves(value, f"{prefix}{key}.")
-        else:
-            long = isinstance(value, list) and len(value) > 6
-            yield f"{prefix}{key} = {f'{len(value)} values' if long else value}"
+def _stated(leaf: tuple[str, Any]) -> str:
+    """'key = value'; of long lists only the number of values."""
+    key, value = leaf
+    long = isinstance(value, list) and len(value) > 6
+    return f"{key} = {f'{len(value)} values' if long else value}"

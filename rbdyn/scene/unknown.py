@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal, NamedTuple, Union, get_args, get_ori
 
 from pydantic import BaseModel
 
-from rbdyn.base.faults import LONGEST_NAME, MOST_FAULTS, Claims, InputError, Sparse, one_line, refuse
+from rbdyn.base.faults import LONGEST_NAME, MOST_FAULTS, Claims, InputError, Sparse, one_line, put_key, refuse
 from rbdyn.base.records import Record
 from rbdyn.base.words import shown, with_error
 from rbdyn.scene import Scene
@@ -238,7 +238,7 @@ def _multiply(
     """Put ``numbers`` of keys into tables, then the products of ``relative`` keys with these, which are removed from there."""
     while numbers:
         for key, value in numbers.items():
-            put(tables, key, value)
+            put_key(tables, key, value, f'uncertain."{key}"')
         products = {key: base for key, base in relative.items() if base != key and base in numbers}
         for key in products:
             del relative[key]
@@ -252,16 +252,6 @@ def _number(scene: Scene | None, base: str, key: str, source: str) -> float:
             f'{source}: uncertain."{key}".times = "{base}": the scene has no number there; name another key'
         )
     return float(value)
-
-
-def put(tables: dict[str, Any], key: str, value: Any) -> None:
-    """Set a dotted key of nested tables. Raises InputError where its path runs through a value."""
-    *path, name = key.split(".")
-    for part in path:
-        tables = tables.setdefault(part, {})
-        if not isinstance(tables, dict):
-            raise InputError(f'uncertain."{key}": {part} is a value, not a table; check the key')
-    tables[name] = value
 
 
 def value_of(scene: Scene | None, key: str) -> Any:

@@ -6,9 +6,10 @@ depend on size and flow. The residence time of the oil checks its order.
 """
 
 import math
+from collections.abc import Iterator
 
 from rbdyn.base.faults import RPM
-from rbdyn.base.notes import Note, Notes
+from rbdyn.base.notes import Note
 
 # X = SCALE W^FLOW_EXPONENT/(n d_m^DIAMETER_EXPONENT), W in cm^3/min, n in rpm, d_m in mm.
 SCALE, FLOW_EXPONENT, DIAMETER_EXPONENT = 1e5, 0.37, 1.7
@@ -36,20 +37,18 @@ def residence(fraction: float, cavity: float, volume_flow: float, cage_speed: fl
     return fraction * cavity * abs(cage_speed) / (2.0 * math.pi) / volume_flow
 
 
-def fraction_notes(speed: float, pitch_diameter: float, stay: float) -> Notes:
+def fraction_notes(speed: float, pitch_diameter: float, stay: float) -> Iterator[Note]:
     """Sentences where the formula is outside its range or the residence ``stay`` in cage turns is unusual."""
-    notes = list[Note]()
     fast = abs(speed) / RPM * 1e3 * pitch_diameter  # [mm/min]
     if not SLOWEST <= fast <= FASTEST:
         sentence = (
             f"oil fraction: {1e-6 * fast:.2g} million mm/min is outside the {1e-6 * SLOWEST:g} to {1e-6 * FASTEST:g} million of its "
             "formula; state lubricant.oil_fraction if it is known"
         )
-        notes.append(Note("oil-fraction", sentence))
+        yield Note("oil-fraction", sentence)
     if not SHORTEST_STAY <= stay <= LONGEST_STAY:
         sentence = (
             f"oil fraction: oil stays for {stay:.2g} turns of the cage, outside the usual {SHORTEST_STAY:g} to {LONGEST_STAY:g}; "
             "check lubricant.oil_flow_l_min"
         )
-        notes.append(Note("oil-fraction", sentence))
-    return tuple(notes)
+        yield Note("oil-fraction", sentence)

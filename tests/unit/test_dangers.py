@@ -100,8 +100,8 @@ def test_notes_alike_are_one_and_the_worst_come_first():
 )  # fmt: skip
 def test_unit_clearances_in_operation(name, drawn, change, code):
     """Unit: nearly lost below a tenth of the drawn clearance, mostly lost, of a cage, below half; of balls a preload is a warning."""
-    notes = clearance_notes({name: OperatingClearance(drawn, 0.0, change, 0.0), "other": None})
-    of_balls = clearance_notes({"radial": OperatingClearance(drawn, 0.0, change, 0.0)}, {"radial": -math.inf})
+    notes = tuple(clearance_notes({name: OperatingClearance(drawn, 0.0, change, 0.0), "other": None}))
+    of_balls = tuple(clearance_notes({"radial": OperatingClearance(drawn, 0.0, change, 0.0)}, {"radial": -math.inf}))
     assert [note.code for note in of_balls] == ["clearance"] * (drawn >= 0.0 > drawn + change)
     assert [note.code for note in notes] == ([] if code is None else [code])
     assert all(f"{name} clearance in operation is {1e6 * (drawn + change):.1f} um" in note for note in notes)

@@ -114,19 +114,19 @@ def test_unit_races_tell_dents_and_thin_films(make_scene, outer):
         return RollerContact(pressure, 90.0, Film(0.2, 0.1, ratio))
 
     sound = contact()
-    assert race_notes(outer, {"inner": sound, "outer": sound}) == ()
+    assert tuple(race_notes(outer, {"inner": sound, "outer": sound})) == ()
     (note,) = race_notes(outer, {"inner": sound, "outer": contact(4001.0)})
     assert note.startswith("outer raceway: dented by 4001 MPa, more than the 4000 MPa of ISO 76") and "rollers" in note
-    dents = [race_notes(outer, {"inner": contact(pressure)})[0].code for pressure in (5311.0, 5313.0)]
+    dents = [next(race_notes(outer, {"inner": contact(pressure)})).code for pressure in (5311.0, 5313.0)]
     assert dents == ["dent", "overload"]
     thin = {"inner": contact(ratio=0.4), "outer": contact(ratio=0.3)}
     (note,) = race_notes(outer, thin)
     assert "lambda is 0.3 on the outer raceway" in note and "traction.friction = 'mixed'" in note
     mixed = ("traction.model=thermal_newtonian", "traction.friction=mixed")
     for changes in (mixed, ("traction.model=coulomb",), ("traction.model=off",)):
-        assert race_notes(make_scene(*changes), thin) == ()
-    assert race_notes(outer, race_report(outer, 730.0, 790.0)) == ()
-    assert race_notes(outer, {"inner": RollerContact(1000.0, 90.0)}) == ()
+        assert tuple(race_notes(make_scene(*changes), thin)) == ()
+    assert tuple(race_notes(outer, race_report(outer, 730.0, 790.0))) == ()
+    assert tuple(race_notes(outer, {"inner": RollerContact(1000.0, 90.0)})) == ()
 
 
 def test_unit_heat_that_no_oil_carries_off(outer):

@@ -156,7 +156,7 @@ def test_unit_oil_fraction():
     assert oil_fraction(flow, -speed, pitch) == usual
     assert oil_fraction(flow, 0.05 * speed, pitch) == 0.15
     assert residence(0.1, 1e-5, 1e-5, 2.0 * math.pi) == pytest.approx(0.1)
-    assert fraction_notes(speed, pitch, 4.0) == ()
+    assert tuple(fraction_notes(speed, pitch, 4.0)) == ()
     slow, short = fraction_notes(0.1 * speed, pitch, 0.5)
     assert slow.startswith("oil fraction: 0.1 million mm/min is outside") and "0.5 turns of the cage" in short
     assert oil_fraction(1000.0 * CM3_PER_MINUTE, speed, pitch) == pytest.approx(usual, rel=1e-12)

@@ -1,14 +1,14 @@
 """Heat of a roller bearing at temperatures: conductances of its parts, the nodes that each power heats, and the films of losses."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 import numpy as np
 
 from rbdyn.base.arrays import Array
 from rbdyn.base.faults import InputError
-from rbdyn.base.notes import Notes
+from rbdyn.base.notes import Note
 from rbdyn.contact.rolling_resistance import rolling_force
 from rbdyn.dynamics.forces.equations import RollerBearing
 from rbdyn.dynamics.parameters.model import rolling_contacts, rolling_law
@@ -194,11 +194,9 @@ def cavity_of(scene: Scene) -> float:
     return cavity_volume(geometry.raceways, ring_width(scene), scene.bearing.rollers, volume, cage)
 
 
-def flow_notes(hot: Scene) -> Notes:
+def flow_notes(hot: Scene) -> Iterator[Note]:
     """Notes where the oil fraction that follows from a flow is a guess; none without a flow."""
-    flow, geometry = hot.lubricant.oil_flow, hot.geometry
-    if flow is None or hot.mounting is None:
-        return ()
-    inner, outer = hot.operation.speeds
-    stay = residence(hot.lubricant.oil_fraction, cavity_of(hot), flow, geometry.motion.cage_speed)
-    return fraction_notes(inner - outer, hot.bearing.pitch_diameter, stay)
+    flow, (inner, outer) = hot.lubricant.oil_flow, hot.operation.speeds
+    if flow is not None and hot.mounting is not None:
+        stay = residence(hot.lubricant.oil_fraction, cavity_of(hot), flow, hot.geometry.motion.cage_speed)
+        yield from fraction_notes(inner - outer, hot.bearing.pitch_diameter, stay)

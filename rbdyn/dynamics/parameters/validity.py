@@ -4,7 +4,7 @@ Each effect left out has the change that it would make and, where possible, an e
 """
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -46,10 +46,11 @@ def race_report(scene: Scene, inner_load: float, outer_load: float) -> dict[str,
     return report
 
 
-def race_notes(scene: Scene, races: Mapping[str, RollerContact]) -> Notes:
+def race_notes(scene: Scene, races: Mapping[str, RollerContact]) -> Iterator[Note]:
     """Notes where ``races`` of a report exceed their laws: dents, and films too thin for the friction of a full one."""
     pressures = {name: 1e6 * race.max_pressure_MPa for name, race in races.items()}
-    notes = [note for name, most in pressures.items() for note in pressure_notes(most, ROLLERS, name)]
+    for name, most in pressures.items():
+        yield from pressure_notes(most, ROLLERS, name)
     law, films = scene.traction, {name: race.film.lambda_ratio for name, race in races.items() if race.film}
     thinnest = min(films, key=films.__getitem__, default=None)
     if thinnest and films[thinnest] < FULL_FILM and law.friction == "film" and law.model not in ("coulomb", "off"):
@@ -57,8 +58,7 @@ def race_notes(scene: Scene, races: Mapping[str, RollerContact]) -> Notes:
             f"film: lambda is {films[thinnest]:.2g} on the {thinnest} raceway, below {FULL_FILM:g}, so asperities touch but only film "
             "friction counts. Set traction.friction = 'mixed', or check lubricant.temperature_C and the roughnesses"
         )
-        notes.append(Note("thin-film", sentence))
-    return tuple(notes)
+        yield Note("thin-film", sentence)
 
 
 def _most_loaded_slice(scene: Scene, race: str, load: float) -> float:
@@ -261,9 +261,8 @@ LEFT_OUT = (
 )
 
 
-def left_out_notes(scene: Scene, power_loss: float) -> Notes:
+def left_out_notes(scene: Scene, power_loss: float) -> Iterator[Note]:
     """Notes on effects that the model leaves out and that matter in this scene, of the simulated ``power_loss`` [W]."""
-    notes = list[Note]()
     for item in LEFT_OUT:
         if item.power is not None:
             power = item.power(scene)
@@ -274,10 +273,9 @@ def left_out_notes(scene: Scene, power_loss: float) -> Notes:
                 sentence = (
                     f"not modelled: {item.name}, which would cause about {shown(power, 2)} W ({size}) {item.changes}"
                 )
-                notes.append(Note(code, sentence))
+                yield Note(code, sentence)
         elif item.matters is not None and item.matters(scene):
-            notes.append(Note("left-out", f"not modelled: {item.name}, which would cause {item.changes}"))
-    return tuple(notes)
+            yield Note("left-out", f"not modelled: {item.name}, which would cause {item.changes}")
 
 
 def limit_notes(scene: Scene) -> Notes:

@@ -29,7 +29,7 @@ The product of both counts too.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -307,12 +307,13 @@ def quantities(
 
 def error_notes(
     scene: Scene, figures: dict[str, Quantity], fault: str | None, tighter: float | None = None
-) -> list[Note]:
+) -> Iterator[Note]:
     """Notes on errors that are large or uncertain, each with its fix.
 
     ``tighter``: the tolerance that removes a numerical error; a tenth of the scene's unless given.
     """
-    notes = [] if fault is None else [Note("numerical-error", f"numerical error: it is not estimated; {fault}")]
+    if fault is not None:
+        yield Note("numerical-error", f"numerical error: it is not estimated; {fault}")
     few = {name: figures[name].effective_samples for name in JUDGED if not _enough(figures[name])}
     if few:
         listed = ", ".join(f"{JUDGED[name]} {count:.1f}" for name, count in few.items())
@@ -320,25 +321,26 @@ def error_notes(
             f"statistical error: fewer than {FEW_SAMPLES:.0f} effective samples make it uncertain ({listed}). "
             "Raise numerics.turns or numerics.replicates"
         )
-        notes.append(Note("few-samples", sentence))
-    return notes + [note for name in JUDGED if (note := _numerical_note(scene, JUDGED[name], figures[name], tighter))]
+        yield Note("few-samples", sentence)
+    for name in JUDGED:
+        yield from _numerical_notes(scene, JUDGED[name], figures[name], tighter)
 
 
 def _enough(figure: Quantity) -> bool:
     return figure.effective_samples >= FEW_SAMPLES or figure.statistical_error == 0.0
 
 
-def _numerical_note(scene: Scene, name: str, figure: Quantity, tighter: float | None) -> Note | None:
+def _numerical_notes(scene: Scene, name: str, figure: Quantity, tighter: float | None) -> Iterator[Note]:
     error, statistical, size = figure.numerical_error, figure.statistical_error, abs(figure.value)
     if error is None or statistical is None or size == 0.0:
-        return None
+        return
     biased = error > RULES * statistical
     if error <= (NOTICEABLE if biased else LARGE) * size:
-        return None
+        return
     rtol, percent = scene.numerics.rtol, f"{100.0 * error / size:.2g} %"
     if biased:
         tolerance = f"{tighter or 0.1 * rtol:.1g}"
         fix = f"); tighten numerics.rtol = {rtol:g} to {tolerance}"
     else:
         fix = ", mostly scatter); raise numerics.turns or numerics.replicates"
-    return Note("numerical-error", f"{name}: may be off by {percent} (numerical error{fix}")
+    yield Note("numerical-error", f"{name}: may be off by {percent} (numerical error{fix}")
