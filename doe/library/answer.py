@@ -210,13 +210,11 @@ def saved(folder: OutputFolder, name: str, answer: "Answer", tables: Callable[[]
         return ()
     from rbdyn.base.records import save_table
 
-    def write(stage: Path) -> list[str]:
+    def write(stage: Path) -> None:
         write_json(stage / name, answer.as_dict())
-        rows_by_file = tables()
-        for table, rows in rows_by_file.items():
+        for table, rows in tables().items():
             save_table(rows, stage / table)
-        return [name, *rows_by_file]
 
     prefix = f"{Path(name).stem}_" if (folder.path / "summary.json").exists() else ""
     identity = answer.identity
-    return tuple(folder.write(lambda stage: with_report(stage, identity, answer.blocks, write, prefix)))
+    return tuple(folder.write(lambda stage: with_report(stage, folder.files, identity, answer.blocks, write, prefix)))

@@ -210,12 +210,11 @@ def run_answer(
             identity = identity_of("doe run", {}, [file for file in (source, base) if file is not None])
             answer = RunsAnswer(record, folder, (), identity=identity, runs=runs, part=words)
 
-            def write(stage: Path) -> list[str]:
+            def write(stage: Path) -> None:
                 from rbdyn.base.records import save_rows
 
                 save_rows(lambda: (run.cells for run in runs), stage / "runs.csv")
                 write_json(stage / "runs.json", record, RowRun.as_dict)
-                return ["runs.csv", "runs.json"]
 
             written = write_with_report(output, identity, answer.blocks, write)
             agenda.finish(written)

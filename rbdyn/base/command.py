@@ -143,7 +143,7 @@ class Delivery(NamedTuple):
     identity: Identity | None
     record: Callable[[], dict[str, Any]]
     blocks: Callable[[], Sequence[Block]]
-    write: Callable[[Path], Sequence[str]]
+    write: Callable[[Path], object]
     failed: bool = False
     closing: Callable[[], object] = lambda: None
 

@@ -49,7 +49,7 @@ class OutputFolder:
     def __init__(
         self, path: Path | None, command: str, files: Sequence[str], keeps: Sequence[str] = (), force: bool = False
     ) -> None:
-        self.path, self._command, self._force, self._keeps = path, command, force, keeps
+        self.path, self.files, self._command, self._force, self._keeps = path, files, command, force, keeps
         self._patterns = [_folded(name) for name in (*files, *keeps, MARK)]
         self._mark: dict[str, Any] = {}
         self._locked = self._new = False
@@ -217,6 +217,12 @@ def output_folder(
             yield folder
         finally:
             folder.close()
+
+
+def files_in(folder: Path, patterns: Sequence[str]) -> list[str]:
+    """Names of the files in a folder, in the order of the patterns of a command."""
+    names = sorted(os.listdir(folder))
+    return [name for pattern in patterns for name in names if fnmatchcase(name, pattern)]
 
 
 def _folded(name: str) -> str:

@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import replace
 from html import escape
-from importlib.resources import files
+from importlib.resources import files as resources
 from itertools import groupby
 from pathlib import Path
 
@@ -29,7 +29,7 @@ from rbdyn.base.blocks import (
     Widget,
     has_content,
 )
-from rbdyn.base.folder import OutputFolder
+from rbdyn.base.folder import OutputFolder, files_in
 from rbdyn.base.identity import Identity, identity_line, identity_table
 from rbdyn.base.words import filled_page
 from rbdyn.base.workbook import NAME, write_workbook
@@ -180,31 +180,38 @@ def write_with_report(
     folder: OutputFolder,
     identity: Identity | None,
     blocks: Callable[[], Sequence[Block]],
-    write: Callable[[Path], Sequence[str]],
+    write: Callable[[Path], object],
 ) -> list[str]:
     """Write ``with_report`` into the folder of a command, without an identity the files alone; names of the files, none without
     a folder. Raises OSError.
     """
-    if folder.path is None:
-        return []
-    return folder.write(lambda stage: with_report(stage, identity, blocks, write) if identity else [*write(stage)])
+
+    def make(stage: Path) -> list[str]:
+        if identity is not None:
+            return with_report(stage, folder.files, identity, blocks, write)
+        write(stage)
+        return files_in(stage, folder.files)
+
+    return [] if folder.path is None else folder.write(make)
 
 
 def with_report(
     folder: Path,
+    files: Sequence[str],
     identity: Identity,
     blocks: Callable[[], Sequence[Block]],
-    write: Callable[[Path], Sequence[str]],
+    write: Callable[[Path], object],
     prefix: str = "",
 ) -> list[str]:
-    """Let ``write`` write the files of a command into ``folder``, then report.html with its pictures and tables.xlsx.
+    """Let ``write`` write the files of a command into an empty ``folder``, then report.html with its pictures and tables.xlsx.
 
+    files : patterns of their names; the names are returned in this order with the two further ones
     blocks : makes the blocks of the terminal
-    write : writes the files and returns their names, which are returned with the two further ones
     prefix : before these two names, where the folder has others that must stay. Raises OSError.
     """
     with vector_copies() as pictures:
-        names = list(write(folder))
+        write(folder)
+    names = files_in(folder, files)
     report, workbook = f"{prefix}{REPORT}", f"{prefix}{NAME}"
     (folder / report).write_text(result_page(identity, blocks(), pictures), encoding="utf-8")
     write_workbook(folder / workbook, [folder / name for name in names if name.endswith(".csv")], identity)
@@ -265,4 +272,4 @@ def identity_section(identity: Identity) -> Section:
 
 def _text(name: str) -> str:
     """A file of the page."""
-    return files("rbdyn.base").joinpath(name).read_text(encoding="utf-8")
+    return resources("rbdyn.base").joinpath(name).read_text(encoding="utf-8")

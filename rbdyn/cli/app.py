@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from rbdyn.cli.simulation_output import MapDuty
     from rbdyn.dynamics.slip_map import SlipMap
 
-# Names of the files of each command, besides those of ``REPORT_FILES``; a map also keeps its finished points.
+# Names of the files of each command in the order of their list, besides those of ``REPORT_FILES``; a map also keeps its finished points.
 SIMULATION_FILES = (
     "result.json",
     "figures.csv",
@@ -46,8 +46,8 @@ MAP_FILES, MAP_POINTS = ("map.json", "map.csv", "duty.csv", "map.png"), "map_poi
 STIFFNESS_FILES = ("stiffness.json", "stiffness.csv", "stiffness.png")
 ACCURACY_FILES = tuple(
     f"{name}.{kind}"
-    for name in ("accuracy", "trajectory", "methods", "coverage", "options", "stability", "solvers")
     for kind in ("json", "csv", "png")
+    for name in ("accuracy", "trajectory", "methods", "coverage", "options", "stability", "solvers")
 )
 SHOW_FILES = (
     "orbit.json", "history.csv", "cage_orbit.png", "forces.png", "whirl.png", "poincare.png", "spectra.png", "roller_loads.png",
@@ -182,8 +182,8 @@ def map_blocks(mapped: "SlipMap", duty: "MapDuty | None" = None) -> list[Block]:
     return with_notes((*mapped.notes, *(duty.notes if duty else ())), answer)
 
 
-def _write_map(mapped: "SlipMap", duty: "MapDuty | None", folder: Path) -> list[str]:
-    """Write map.json, map.csv and map.png, with a duty also duty.csv; returns the file names."""
+def _write_map(mapped: "SlipMap", duty: "MapDuty | None", folder: Path) -> None:
+    """Write map.json, map.csv and map.png, with a duty also duty.csv."""
     from rbdyn.base.files import write_json
     from rbdyn.dynamics.slip_map import map_sheet
     from rbdyn.life import life_sheet
@@ -192,10 +192,8 @@ def _write_map(mapped: "SlipMap", duty: "MapDuty | None", folder: Path) -> list[
     write_json(folder / "map.json", _map_record(mapped, duty))
     map_sheet(mapped.points).save(folder)
     draw_slip_map(mapped, folder / "map.png", duty.marks if duty else {})
-    if duty is None:
-        return ["map.json", "map.csv", "map.png"]
-    life_sheet(duty.points).save(folder)
-    return ["map.json", "map.csv", "duty.csv", "map.png"]
+    if duty is not None:
+        life_sheet(duty.points).save(folder)
 
 
 def _map_record(mapped: "SlipMap", duty: "MapDuty | None") -> dict[str, Any]:

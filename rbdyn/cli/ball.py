@@ -16,16 +16,13 @@ if TYPE_CHECKING:
     from rbdyn.quasistatic.result import BallResult
 
 
-# Names of the files of an equilibrium, of a sweep, of the other studies and of all pictures.
-EQUILIBRIUM_FILES, SWEEP_FILES = ("result.json", "balls.csv", "runout.csv", "start.csv"), ("sweep.json", "sweep.csv")
-STUDY_FILES = tuple(
-    f"{name}.{kind}" for name in ("preload", "clearance", "wear", "race_limits") for kind in ("json", "csv")
-)
-PICTURES = (
-    "loads.png", "angles.png", "section.png", "pressure_and_life.png", "stiffness.png", "azimuth.png", "map.png",
-    "start.png",
+# Names of the files of an equilibrium, of its studies and of all pictures, in the order of their list.
+STUDIES = ("sweep", "preload", "clearance", "wear", "race_limits")
+FILES = (
+    "result.json", "start.csv", "start.png", "balls.csv", *(f"{name}.{kind}" for name in STUDIES for kind in ("json", "csv")),
+    "loads.png", "angles.png", "section.png", "pressure_and_life.png", "stiffness.png", "azimuth.png", "map.png", "runout.csv",
+    *REPORT_FILES,
 )  # fmt: skip
-FILES = (*EQUILIBRIUM_FILES, *SWEEP_FILES, *STUDY_FILES, *PICTURES, *REPORT_FILES)
 
 VALUES = "start:stop:count or a,b,c"
 

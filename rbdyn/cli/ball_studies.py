@@ -99,13 +99,13 @@ def points_table(result: SweepResult) -> Table:
     return Table("", [*units, *HEADER], rows)
 
 
-def write_sweep(result: SweepResult, folder: Path) -> list[str]:
-    """Write sweep.json, sweep.csv and pictures; returns the names of the files."""
+def write_sweep(result: SweepResult, folder: Path) -> None:
+    """Write sweep.json, sweep.csv and pictures."""
     from rbdyn.plots.ball import sweep_pictures
 
     write_json(folder / "sweep.json", result.as_dict())
     result.save(folder / "sweep.csv")
-    return ["sweep.json", "sweep.csv", *sweep_pictures(result, folder)]
+    sweep_pictures(result, folder)
 
 
 def _row(result: SweepResult, place: int) -> list[str]:
@@ -239,15 +239,16 @@ def run(
     return Delivery(identity, study.as_dict, partial(blocks, study), partial(write_study, name, study))
 
 
-def write_study(name: str, study: RaceLimits | OptimumStudy, folder: Path) -> list[str]:
-    """Write the record of a study, its points and their pictures, or the limits of race errors; returns the names of the files."""
-    write_json(folder / f"{name}.json", study.as_dict())
-    if isinstance(study, RaceLimits):
-        return [f"{name}.json", limit_sheet(study).save(folder)]
+def write_study(name: str, study: RaceLimits | OptimumStudy, folder: Path) -> None:
+    """Write the record of a study, its points and their pictures, or the limits of race errors."""
     from rbdyn.plots.ball import sweep_pictures
 
-    study.table.save(folder / f"{name}.csv")
-    return [f"{name}.json", f"{name}.csv", *sweep_pictures(study.table, folder)]
+    write_json(folder / f"{name}.json", study.as_dict())
+    if isinstance(study, RaceLimits):
+        limit_sheet(study).save(folder)
+    else:
+        study.table.save(folder / f"{name}.csv")
+        sweep_pictures(study.table, folder)
 
 
 def limit_sheet(limits: RaceLimits) -> Sheet[lots.RaceHeights]:
@@ -329,25 +330,21 @@ def with_runout(scene: BallScene, result: BallResult) -> "tuple[BallResult, pd.D
     return replace(result, runout=ring.runout(lots.bench_of(scene).face_radius)), ring.table()
 
 
-def write_equilibrium(result: BallResult, path: "pd.DataFrame | None", folder: Path) -> list[str]:
-    """Write result.json, balls.csv, pictures and the ``path`` of a turning ring; returns the names of the files."""
+def write_equilibrium(result: BallResult, path: "pd.DataFrame | None", folder: Path) -> None:
+    """Write result.json, balls.csv, pictures and the ``path`` of a turning ring."""
     result.save(folder / "result.json")
-    files = ["result.json"]
     if result.start is not None:
         from rbdyn.plots.start import start
 
         start_sheet(result.start).save(folder)
         start(result.start, folder / "start.png")
-        files += ["start.csv", "start.png"]
-    if not result.is_equilibrium:
-        return files
-    from rbdyn.plots.ball import pictures
+    if result.is_equilibrium:
+        from rbdyn.plots.ball import pictures
 
-    files += [ball_sheet(result.row_reports).save(folder, "%.8g"), *pictures(result, folder)]
+        ball_sheet(result.row_reports).save(folder, "%.8g")
+        pictures(result, folder)
     if path is not None:
         save_table(path, folder / "runout.csv", "%.8g")
-        files.append("runout.csv")
-    return files
 
 
 def _row_tables(title: str, row: RowReport) -> list[Block]:

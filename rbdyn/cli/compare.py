@@ -155,11 +155,10 @@ def _part_sentence(parts: Mapping[str, "Difference"]) -> str:
     return f"Parts that differ: {_named(by_kind, 'significant') or 'none'} (all of them: -v)." if parts else ""
 
 
-def _write(found: "Comparison", folder: Path) -> list[str]:
-    """Write comparison.json, inputs.csv and differences.csv; returns the names of the files."""
+def _write(found: "Comparison", folder: Path) -> None:
+    """Write comparison.json, inputs.csv and differences.csv."""
     from rbdyn.comparison import difference_sheet, input_sheet
 
     found.save(folder / FILES[0])
     input_sheet(found.inputs).save(folder)
     difference_sheet(found.figures | found.parts).save(folder, "%.8g")
-    return list(FILES)

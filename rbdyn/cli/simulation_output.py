@@ -79,8 +79,8 @@ def blocks(result: SimulationResult, folder: Path | None = None) -> list[Block]:
     ]
 
 
-def write(scene: Scene, result: SimulationResult, folder: Path) -> list[str]:
-    """Write result.json, figures.csv, history.csv, bearing.rexs and pictures, of a start too; returns the names of the files."""
+def write(scene: Scene, result: SimulationResult, folder: Path) -> None:
+    """Write result.json, figures.csv, history.csv, bearing.rexs and pictures, of a start too."""
     from rbdyn import plots
     from rbdyn.dynamics.motion import history, most_turns
 
@@ -94,26 +94,15 @@ def write(scene: Scene, result: SimulationResult, folder: Path) -> list[str]:
     classes = {} if result.verdict is None else {title: result.verdict.name}
     plots.cage_orbit({title: motion}, folder / "cage_orbit.png", classes)
     plots.pocket_forces({title: motion}, folder / "pocket_forces.png")
-    files = [
-        "result.json",
-        "figures.csv",
-        _write_rexs(scene, result, folder),
-        "history.csv",
-        "roller_loads.png",
-        "cage_orbit.png",
-        "pocket_forces.png",
-    ]
+    _write_rexs(scene, result, folder)
     if result.stiffness_N_um is not None:
         plots.stiffness_over_clearance(scene, folder / "stiffness.png")
-        files.append("stiffness.png")
     if result.start is not None:
         start_sheet(result.start).save(folder)
         plots.start(result.start, folder / "start.png")
-        files += ["start.csv", "start.png"]
-    return files
 
 
-def _write_rexs(scene: Scene, result: SimulationResult, folder: Path) -> str:
+def _write_rexs(scene: Scene, result: SimulationResult, folder: Path) -> None:
     """Write what REXS has a name for: the bearing, its operating point, speeds, loss, clearances and pressures."""
     bearing, operation, clearance = scene.bearing, scene.operation, result.clearance_um
     speed_rpm = operation.inner_speed_rpm - operation.outer_speed_rpm
@@ -157,7 +146,7 @@ def _write_rexs(scene: Scene, result: SimulationResult, folder: Path) -> str:
     }
     lubricant: Attributes = {"name": ("none", scene.lubricant.oil)}
     name = bearing.designation or "cylindrical roller bearing"
-    return write_rexs(folder / "bearing.rexs", name, attributes, row, element, lubricant)
+    write_rexs(folder / "bearing.rexs", name, attributes, row, element, lubricant)
 
 
 def _figures(result: SimulationResult) -> "dict[str, Quantity]":
@@ -543,7 +532,7 @@ def _worst(name: str, worst: "Worst") -> str:
     return f"{quantity(name)[0].replace(' operating', '')} at {worst.point}{doubt}"
 
 
-def write_simulated(found: "DutySimulation", folder: Path) -> list[str]:
-    """Write duty.json and points.csv; returns their names."""
+def write_simulated(found: "DutySimulation", folder: Path) -> None:
+    """Write duty.json and points.csv."""
     found.save(folder / "duty.json")
-    return ["duty.json", found.sheet.save(folder, "%.8g")]
+    found.sheet.save(folder, "%.8g")

@@ -27,7 +27,6 @@ from rbdyn.scene import BallScene, Scene, scene_of
 from rbdyn.scene.duty import AXES
 
 FORMAT = "rbdyn.stiffness/1"
-FILES = ("stiffness.json", "stiffness.csv", "stiffness.png")
 # Programs of rotors interpolate over speed by cubic splines.
 FEWEST_SPEEDS = 5
 ENTRIES = ("xx", "xy", "yx", "yy")
@@ -237,11 +236,10 @@ def _axes_sentence(found: StiffnessMap) -> str:
     return f"The load points {where}; damping {damping}. Files have N/m and rad/s for a program of rotors."
 
 
-def write(found: StiffnessMap, folder: Path) -> list[str]:
-    """Write stiffness.json, stiffness.csv and stiffness.png; returns their names."""
+def write(found: StiffnessMap, folder: Path) -> None:
+    """Write stiffness.json, stiffness.csv and stiffness.png."""
     from rbdyn.plots.roller import draw_stiffness
 
     write_json(folder / "stiffness.json", found.as_dict())
     found.sheet.save(folder)
     draw_stiffness(found.speeds_rpm, found.loads_N, found.grid("xx"), found.grid("yy"), folder / "stiffness.png")
-    return list(FILES)

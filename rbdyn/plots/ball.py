@@ -30,15 +30,12 @@ RINGS = {
 }
 
 
-def pictures(result: "BallResult", folder: Path) -> list[str]:
-    """Draw loads.png, angles.png and section.png of an equilibrium; returns the names, none without an equilibrium."""
-    if not result.is_equilibrium:
-        return []
+def pictures(result: "BallResult", folder: Path) -> None:
+    """Draw loads.png, angles.png and section.png of an equilibrium."""
     rows = {f"{name} row" if name else "": row.balls for name, row in result.row_reports.items()}
     loads(rows, folder / "loads.png")
     angles(rows, folder / "angles.png")
     section(rows, result.scene["bearing"], folder / "section.png")
-    return ["loads.png", "angles.png", "section.png"]
 
 
 def column(balls: Balls, name: str) -> Array:

@@ -264,8 +264,8 @@ def _oil(lubricant: Component | None) -> str | None:
 
 def write_rexs(
     path: Path, name: str, bearing: Attributes, row: Attributes, element: Attributes, lubricant: Attributes
-) -> str:
-    """Write a REXS 2.0 file of one bearing with detailed geometry; returns its name. Values that are None are left out."""
+) -> None:
+    """Write a REXS 2.0 file of one bearing with detailed geometry. Values that are None are left out."""
     from importlib.metadata import version
 
     model = Tree.Element("model", applicationId="rbdyn", applicationVersion=version("rbdyn"), version="2.0")
@@ -286,4 +286,3 @@ def write_rexs(
         Tree.SubElement(relation, "ref", id=str(part), role="part")
     Tree.indent(model)
     path.write_bytes(Tree.tostring(model, encoding="utf-8", xml_declaration=True))
-    return path.name

@@ -254,8 +254,8 @@ def test_unit_capacities_of_balls():
 
 def test_unit_table_picture_and_screen_of_a_start_of_balls(cold, tmp_path):
     """Unit: start.csv has a row a moment, the picture is written, and the answer has the extremes with ranges and times."""
-    files = write_equilibrium(cold, None, tmp_path)
-    assert {"start.csv", "start.png"} <= set(files) and (tmp_path / "start.png").stat().st_size > 20_000
+    write_equilibrium(cold, None, tmp_path)
+    assert (tmp_path / "start.csv").exists() and (tmp_path / "start.png").stat().st_size > 20_000
     frame = start_sheet(cold.start).frame
     assert frame["axial_load_N"].max() == pytest.approx(cold.start.axial_load_N.greatest.value, rel=1e-3)
     assert (frame["low_radial_clearance_um"] <= frame["high_radial_clearance_um"]).all()

@@ -17,8 +17,9 @@ from in_process import in_process
 from rbdyn import accuracy
 from rbdyn.accuracy.variants import OPTIONS, option_costs, study_options, with_options
 from rbdyn.base.faults import InputError, axis_values
+from rbdyn.base.folder import files_in
 from rbdyn.base.terminal import text as terminal_text
-from rbdyn.cli.app import MAP_POINTS, map_blocks
+from rbdyn.cli.app import MAP_FILES, MAP_POINTS, map_blocks
 from rbdyn.cli.app import _write_map as write
 from rbdyn.dynamics.slip_map import PANELS, slip_map
 from rbdyn.scene import Scene
@@ -69,9 +70,9 @@ def test_physics_light_load_slips_more(outer):
 
 def test_unit_map_saves_table_picture_and_json(found, tmp_path, drawn):
     """Unit: files are whole; the table has a row a point and a column an error."""
-    files = write(found, None, tmp_path)
+    write(found, None, tmp_path)
     saved = json.loads((tmp_path / "map.json").read_text())
-    assert files == ["map.json", "map.csv", "map.png"]
+    assert files_in(tmp_path, MAP_FILES) == ["map.json", "map.csv", "map.png"]
     assert not lacking(drawn["map.png"], [100.0 * found.grid("cage_slip"), found.grid("power_loss_W")])
     assert saved["format"] == "rbdyn.map/1" and saved["status"] == "ok" and len(saved["points"]) == 4
     table = found.table()

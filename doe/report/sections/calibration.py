@@ -24,7 +24,7 @@ from rbdyn.scene.unknown import Input
 POSTERIOR = "doe.posterior/1"
 RECORD, SAMPLE, OF_SAMPLE = "calibration.json", identification.SAMPLE_FILE, "posterior.json"
 CORNER, COMPARED, MEASURED = "corner.png", "measured.png", "measured.csv"
-FILES = (RECORD, SAMPLE, OF_SAMPLE, CORNER, COMPARED, MEASURED, REPORT, WORKBOOK)
+FILES = (RECORD, MEASURED, SAMPLE, OF_SAMPLE, CORNER, COMPARED, REPORT, WORKBOOK)
 # Least move of an input by an unseen offset that is named next to the largest, in standard deviations; most of them.
 MOVED, MOST_MOVED = 0.5, 3
 # Most inputs of a corner plot, those that contract most; share of their ranges that it omits at either end.
@@ -200,7 +200,7 @@ def _hidden_words(name: str, output: identification.OutputAnswer, resolution: fl
 
 def write(calibration: identification.Calibration, folder: Path, identity: Identity) -> None:
     """Tables, the posterior sample with its verdict, pictures, the page and the workbook of these, calibration.json."""
-    with_report(folder, identity, partial(blocks, calibration), partial(_write_parts, calibration))
+    with_report(folder, FILES, identity, partial(blocks, calibration), partial(_write_parts, calibration))
     # Last, as it marks the folder as complete.
     write_json(folder / RECORD, calibration.as_dict())
 
@@ -212,8 +212,8 @@ def signed(calibration: identification.Calibration) -> identification.Calibratio
     return replace(calibration, sha256=record["sha256"])
 
 
-def _write_parts(calibration: identification.Calibration, folder: Path) -> list[str]:
-    """measured.csv, the posterior sample with its verdict, and the pictures; returns their names."""
+def _write_parts(calibration: identification.Calibration, folder: Path) -> None:
+    """measured.csv, the posterior sample with its verdict, and the pictures."""
     measured_sheet(calibration).save(folder)
     draw_compared(calibration.cells, folder / COMPARED)
     if calibration.evidence is not None and calibration.posterior:
@@ -223,7 +223,6 @@ def _write_parts(calibration: identification.Calibration, folder: Path) -> list[
         sha256 = digest_of((folder / SAMPLE).read_bytes())
         write_json(folder / OF_SAMPLE, {"format": POSTERIOR, "sample": SAMPLE, "sha256": sha256, **origin})
         draw_corner(calibration, calibration.evidence, folder / CORNER)
-    return _parts(calibration)
 
 
 def write_sample(rows: Sequence[Mapping[str, Any]], path: Path) -> None:
@@ -232,13 +231,10 @@ def write_sample(rows: Sequence[Mapping[str, Any]], path: Path) -> None:
         csv.writer(file).writerows(map(text_of, row) for row in (list(rows[0]), *(row.values() for row in rows)))
 
 
-def _parts(calibration: identification.Calibration) -> list[str]:
-    return [MEASURED, *((SAMPLE, OF_SAMPLE, CORNER) if calibration.posterior else ()), COMPARED]
-
-
 def files_of(calibration: identification.Calibration) -> list[str]:
     """Names of the files of a calibration."""
-    return [RECORD, *_parts(calibration), REPORT, WORKBOOK]
+    absent = () if calibration.posterior else (SAMPLE, OF_SAMPLE, CORNER)
+    return [name for name in FILES if name not in absent]
 
 
 def stored(folder: Path, made_of: str) -> identification.Calibration | None:

@@ -164,14 +164,14 @@ def _share(share: Share | None) -> str:
     return "" if share is None else share.of_hundred
 
 
-def write_uncertainty(uncertainty: Uncertainty, folder: Path) -> list[str]:
-    """uncertainty.json, input_sets.csv, ranges.csv, shares.csv and uncertainty.png; returns their names."""
+def write_uncertainty(uncertainty: Uncertainty, folder: Path) -> None:
+    """uncertainty.json, input_sets.csv, ranges.csv, shares.csv and uncertainty.png."""
     write_json(folder / "uncertainty.json", uncertainty.as_dict())
     rows, outputs = set_rows(uncertainty), uncertainty.responses.values()
     write_sample(rows, folder / "input_sets.csv")
-    sheets = range_sheet(outputs).save(folder), share_sheet(outputs).save(folder)
+    range_sheet(outputs).save(folder)
+    share_sheet(outputs).save(folder)
     draw_uncertainty(uncertainty, folder / "uncertainty.png")
-    return ["uncertainty.json", "input_sets.csv", *sheets, "uncertainty.png"]
 
 
 def draw_uncertainty(uncertainty: Uncertainty, path: Path) -> None:
