@@ -29,6 +29,7 @@ from doe.unknown.posterior import PARTICLES, Cells, Errors, Joint, Level, Measur
 from doe.unknown.propagation import MEDIAN_FIRST
 from doe.unknown.width import Power, Scores, Width, prequential, scores_of, width
 from rbdyn.base.arrays import Array, Mask, Whole
+from rbdyn.base.faults import given
 from rbdyn.base.records import Record, keyed
 
 # Implausibility from which an input set is ruled out.
@@ -170,8 +171,7 @@ def matched(
             break
         agrees = partial(_agrees, unknowns, cells, measured, wave)
         points = _spread_over(candidates[fits], agrees, count, random)
-    assert batch is not None and cells is not None
-    match = Matched(measured, unknowns, batch, cells, volumes, refuted, None, None, 0.0)
+    match = Matched(measured, unknowns, given(batch), given(cells), volumes, refuted, None, None, 0.0)
     # A discrepancy beyond the allowed one may still show patterns; an exact simulation that is refuted identifies nothing.
     return match if refuted and not measured.scales.any() else _posterior(simulate, match, seed, particles, random)
 

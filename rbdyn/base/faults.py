@@ -127,6 +127,12 @@ class InputError(Exception):
         return type(self), (self.faults,)
 
 
+def given(value: N | None) -> N:
+    """A value that may be missing elsewhere, where what was validated or asked before says that it is there."""
+    assert value is not None
+    return value
+
+
 def refuse(faults: Iterable[str]) -> None:
     """Raises InputError if there are faults."""
     if sentences := list(faults):

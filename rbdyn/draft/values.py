@@ -5,6 +5,7 @@ import math
 from collections import defaultdict
 from typing import Any, NamedTuple
 
+from rbdyn.base.faults import given
 from rbdyn.base.words import shown
 from rbdyn.draft.options import POLYAMIDE_NAME, Options
 from rbdyn.life import rollers
@@ -371,8 +372,7 @@ def _clearance(subject: Subject) -> Values:
 
 def _cage(subject: Subject, inside: catalogue.RollerInterior) -> Values:
     """A cage of its kind about the pitch circle."""
-    kind = subject.cage
-    assert kind is not None
+    kind = given(subject.cage)
     soft, landed = kind.material == POLYAMIDE_NAME, kind.guidance != "roller"
     density = POLYAMIDE_DENSITY if soft else 1e-6 * MATERIALS[kind.material].density
     sizes = inside.rollers, inside.roller_diameter, inside.roller_length, inside.pitch_diameter

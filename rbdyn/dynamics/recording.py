@@ -17,7 +17,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from rbdyn.base.arrays import Array, Whole
-from rbdyn.base.faults import RunError
+from rbdyn.base.faults import RunError, given
 from rbdyn.base.notes import Note, Notes
 from rbdyn.base.records import Record
 from rbdyn.base.words import Notice
@@ -188,8 +188,7 @@ class Recording:
     def _filtered_whirl(self) -> Array:
         scene = self.run.scene
         places, rate = np.array(self._places).reshape(-1, 2).T, scene.whirl_samples_per_turn / scene.turn_s
-        cutoff, notches = scene.numerics.whirl_cutoff_hz, scene.numerics.whirl_notches_hz
-        assert cutoff is not None
+        cutoff, notches = given(scene.numerics.whirl_cutoff_hz), scene.numerics.whirl_notches_hz
         return speed_sums(filtered_speed(places, rate, cutoff, notches), self._sampled)
 
     def _look(self) -> tuple[float, float, float]:

@@ -16,23 +16,14 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rbdyn.base.arrays import Array
-from rbdyn.base.faults import RPM, InputError, RunError
+from rbdyn.base.faults import RPM, InputError, RunError, given
 from rbdyn.base.notes import Note, Notes, status_notes
 from rbdyn.base.records import finite
 from rbdyn.base.words import NORMAL, all_of
 from rbdyn.clearances import DIFFERENCE
 from rbdyn.dynamics.figures import POWER_LOSS
 from rbdyn.dynamics.parameters.heat import loss_levels, term_shares
-from rbdyn.dynamics.parameters.start import (
-    Machine,
-    Path,
-    Simulated,
-    at_point,
-    capacities,
-    clearances_at,
-    seats_of,
-    turning_speed,
-)
+from rbdyn.dynamics.parameters.start import Machine, Path, Simulated, at_point, capacities, clearances_at, seats_of
 from rbdyn.dynamics.parameters.state import load_distribution
 from rbdyn.dynamics.parameters.validity import race_report
 from rbdyn.dynamics.statistics.metrics import quantity, work_done
@@ -50,7 +41,7 @@ from rbdyn.result import (
     StartResult,
 )
 from rbdyn.scene import Scene, input_ranges
-from rbdyn.scene.thermal import Temperatures, at_temperatures, ceilings, point_before
+from rbdyn.scene.thermal import Temperatures, at_temperatures, ceilings, point_before, turning_speed
 from rbdyn.thermal import start as warming
 from rbdyn.thermal.fixed_point import State
 from rbdyn.thermal.losses import HOTTEST
@@ -145,10 +136,10 @@ def _parts_before(balance: Balance) -> tuple[list[float] | None, list[Balance]]:
 
 
 def _machine(scene: Scene, state: State, before: Sequence[float] | None) -> Machine:
-    thermal, hot = scene.thermal, state.run.hot
-    assert thermal is not None and thermal.start is not None
-    cold = np.array(before or thermal.start.temperatures(thermal.ambient_C), dtype=np.float64)
-    course = thermal.start.course(turning_speed(scene), scene.operation.radial_load_N)
+    thermal, hot = given(scene.thermal), state.run.hot
+    start = given(thermal.start)
+    cold = np.array(before or start.temperatures(thermal.ambient_C), dtype=np.float64)
+    course = start.course(turning_speed(scene.operation.speeds), scene.operation.radial_load_N)
     parts, boundaries = capacities(hot, thermal), state.model.boundaries
     matrix, _ = warming.Surroundings(state.model.conductances, seats_of(hot), boundaries).network()
     end = float(course.times[-1]) + warming.SETTLED * warming.slowest(parts, matrix)
@@ -168,7 +159,7 @@ def _steady_moment(machine: Machine) -> Simulated:
     """The steady state, which is simulated already, as a moment."""
     scene, state = machine.scene, machine.state
     nodes = np.append(state.temperatures, [state.temperatures[OUTER], state.temperatures[INNER]])
-    return _simulated(machine, state, None, nodes, turning_speed(scene), scene.operation.radial_load_N)
+    return _simulated(machine, state, None, nodes, turning_speed(scene.operation.speeds), scene.operation.radial_load_N)
 
 
 def _moment(machine: Machine, balance: Balance, runs: list[Balance], time: float, nodes: Array) -> Simulated:
@@ -326,7 +317,8 @@ def _verdict(machine: Machine, law: warming.Law, path: Path) -> tuple[str, str]:
             return "seizure", f"{at} the radial clearance is lost and the heat runs away"
         return "no steady state", f"{at} a temperature passes what any oil bears"
     operation = machine.scene.operation
-    ends_there = tuple(machine.course.at(times[-1])) == (turning_speed(machine.scene), operation.radial_load_N)
+    operating = turning_speed(operation.speeds), operation.radial_load_N
+    ends_there = tuple(machine.course.at(times[-1])) == operating
     gap = float(np.abs(nodes[-1, : len(NODES)] - machine.state.temperatures).max())
     if ends_there and gap > warming.STEADY:
         return (

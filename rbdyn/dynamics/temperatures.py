@@ -20,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rbdyn.base.arrays import Array
-from rbdyn.base.faults import InputError, RunError
+from rbdyn.base.faults import InputError, RunError, given
 from rbdyn.base.notes import Note, Notes, status_notes, status_of
 from rbdyn.dynamics.ensemble import Reporter
 from rbdyn.dynamics.forces.equations import RollerBearing
@@ -140,8 +140,7 @@ class Balance:
     """Map from temperatures to those that balance their heat, by short runs or by those of the scene."""
 
     def __init__(self, scene: Scene, simulate: Simulate) -> None:
-        assert scene.thermal is not None
-        self.scene, self.simulate, self.thermal = scene, simulate, scene.thermal
+        self.scene, self.simulate, self.thermal = scene, simulate, given(scene.thermal)
         self.compile_s, self.wall_s = 0.0, 0.0
         self.viscosity = log_viscosity(scene.lubricant.at)
         self.runs: list[Replicate] = []
@@ -448,8 +447,7 @@ def _shifted(loss: Quantity, more: float) -> Quantity:
 
 def _ranges(scene: Scene, hot: Scene, path: Sequence[State], slopes: Array) -> Ranges:
     """Ranges over the unknown inputs of the balance, about the steady state next to the last one, by the model of the search."""
-    mounting = hot.mounting
-    assert mounting is not None
+    mounting = given(hot.mounting)
 
     def clearances(nodes: Array, thermals: Sequence[Thermal]) -> dict[str, Array]:
         parts = part_temperatures(together(thermals), Temperatures(*nodes.T))
@@ -496,7 +494,5 @@ def _notes(scene: Scene, hot: Scene, status: str, reason: str, ranges: Ranges) -
     """Notes of the heat balance: its verdict, what its inputs leave open, and where the oil fraction is a guess."""
     yield from status_notes(f"{status}: {reason}")
     yield from ranges.notes
-    thermal, mounting = scene.thermal, scene.mounting
-    assert thermal is not None and mounting is not None
-    yield from heat_notes(thermal, scene.lubricant, mounting, heat.ring_width(scene))
+    yield from heat_notes(given(scene.thermal), scene.lubricant, given(scene.mounting), heat.ring_width(scene))
     yield from heat.flow_notes(hot)

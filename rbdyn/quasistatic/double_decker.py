@@ -24,7 +24,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from rbdyn.base.arrays import Array, Mask
-from rbdyn.base.faults import RPM
+from rbdyn.base.faults import RPM, given
 from rbdyn.base.records import finite
 from rbdyn.contact.point_contact import PointContact
 from rbdyn.life import balls
@@ -194,8 +194,7 @@ def solve_double_decker(
             return reached
         if best is None or reached.residual < best.residual:
             best = reached
-    assert best is not None
-    return best
+    return given(best)
 
 
 def _shared_displacement(stack: Stack, load: Array, constraint: Array, middle_constraint: Array, share: float) -> Array:
@@ -481,8 +480,7 @@ def middle_speed(scene: DoubleDeckerScene) -> SpeedSplit:
 
 def layer_frictions(scene: DoubleDeckerScene) -> tuple[LayerFriction, LayerFriction]:
     """Friction of the inner and the outer row, both under the scene's load; prescribed displacements add no friction."""
-    assert scene.lubricant is not None
-    oil = scene.lubricant.in_service
+    oil = given(scene.lubricant).in_service
     viscosity = oil.viscosity / oil.density
     x, y, axial = scene.operation.load
     middle = scene.bearing.middle

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rbdyn.base.arrays import Array
-from rbdyn.base.faults import InputError, RunError
+from rbdyn.base.faults import InputError, RunError, given
 from rbdyn.base.notes import Note, Notes, status_notes
 from rbdyn.clearances import DIFFERENCE
 from rbdyn.life.friction import NO_AXIAL_LOAD
@@ -27,7 +27,7 @@ from rbdyn.scene import input_ranges
 from rbdyn.scene.ball import SingleRowScene
 from rbdyn.scene.fits import mounted_of, row_change
 from rbdyn.scene.operation import raceway_radii
-from rbdyn.scene.thermal import Temperatures, Thermal, oil_ceiling, part_temperatures
+from rbdyn.scene.thermal import Temperatures, Thermal, oil_ceiling, part_temperatures, turning_speed
 from rbdyn.thermal import start as warming
 from rbdyn.thermal.fixed_point import Search
 from rbdyn.thermal.losses import HOTTEST
@@ -148,15 +148,9 @@ def with_start(scene: SingleRowScene, search: Search, result: BallResult, ranged
     return replace(result, status=f"{start.status}: start: {start.reason}", report=None, rows=())
 
 
-def turning_speed(scene: SingleRowScene) -> float:
-    """Speed of the inner ring, or of the outer one where the inner ring stands still, without a sign [rad/s]."""
-    inner, outer = scene.operation.speeds
-    return abs(inner) or abs(outer)
-
-
 def at_point(scene: SingleRowScene, speed: float, load: float) -> SingleRowScene:
     """The scene at another speed [rad/s] and radial load [N]; both rings keep their ratio, and the load its direction."""
-    operation, ratio = scene.operation, speed / turning_speed(scene)
+    operation, ratio = scene.operation, speed / turning_speed(scene.operation.speeds)
     x, y, z = operation.load_N or (operation.radial_load_N or 0.0, 0.0, operation.axial_load_N or 0.0)
     radial = math.hypot(x, y)
     keys: dict[str, Any] = {
@@ -173,30 +167,28 @@ def _seat_nodes(nodes: Array) -> tuple[float, float]:
 
 
 def _surroundings(heat: Heat) -> warming.Surroundings:
-    rings, lubricant, mounting = mounted_of(heat.scene), heat.scene.lubricant, heat.scene.mounting
-    assert rings is not None and lubricant is not None and mounting is not None and mounting.width is not None
-    seats = warming.seats_between(rings, mounting.width, lubricant.in_service.conductivity)
+    rings, width = given(mounted_of(heat.scene)), given(given(heat.scene.mounting).width)
+    seats = warming.seats_between(rings, width, given(heat.scene.lubricant).in_service.conductivity)
     return warming.Surroundings(heat.conductances, seats, heat.boundaries)
 
 
 def capacities(hot: SingleRowScene, widths: tuple[float, float]) -> Array:
     """Heat capacities of ``WARMING_NODES`` [J/K]; the model has no cage. The oil fills the cavity of a bath, else its fraction of it."""
-    rings, lubricant, mounting, row = mounted_of(hot), hot.lubricant, hot.mounting, hot.bearing
-    assert rings is not None and lubricant is not None and mounting is not None and mounting.width is not None
+    rings, lubricant, width, row = mounted_of(hot), given(hot.lubricant), given(given(hot.mounting).width), hot.bearing
     ball, oil, (inner, outer) = hot.material("ball"), lubricant.in_service, raceway_radii(row)
     volume = math.pi * row.ball_diameter**3 / 6.0
-    cavity = cavity_volume((outer, inner), mounting.width, row.balls, volume, 0.0)
+    cavity = cavity_volume((outer, inner), width, row.balls, volume, 0.0)
     fill = 1.0 if lubricant.supply == "bath" else lubricant.oil_fraction
     balls = row.balls * volume * ball.density * ball.heat_capacity
-    return warming.capacities_of(rings, mounting.width, widths, fill * cavity * oil.density * oil.heat_capacity, balls)
+    return warming.capacities_of(given(rings), width, widths, fill * cavity * oil.density * oil.heat_capacity, balls)
 
 
 def _machine(scene: SingleRowScene, search: Search) -> Machine:
-    thermal, found = scene.thermal, search.last.run
-    assert thermal is not None and thermal.start is not None
-    cold = np.array(thermal.start.temperatures(thermal.ambient_C), dtype=np.float64)
-    course = thermal.start.course(turning_speed(scene), math.hypot(*scene.operation.load[:2]))
-    parts = capacities(found.scene, thermal.start.widths)
+    thermal, found = given(scene.thermal), search.last.run
+    start = given(thermal.start)
+    cold = np.array(start.temperatures(thermal.ambient_C), dtype=np.float64)
+    course = start.course(turning_speed(scene.operation.speeds), math.hypot(*scene.operation.load[:2]))
+    parts = capacities(found.scene, start.widths)
     matrix, _ = _surroundings(found).network()
     end = float(course.times[-1]) + warming.SETTLED * warming.slowest(parts, matrix)
     return Machine(scene, thermal, parts, course, cold, search, end)
@@ -285,19 +277,18 @@ def _runaway(machine: Machine, path: Path) -> str:
 
 def _verdict(machine: Machine, path: Path) -> tuple[str, str]:
     """Status of a start, and why it is not steady."""
-    times, nodes, thermal, lubricant = path.rows.times, path.rows.temperatures, machine.thermal, machine.scene.lubricant
-    assert lubricant is not None
+    times, nodes = path.rows.times, path.rows.temperatures
     if path.fault:
         return "seizure", f"{_runaway(machine, path)}after {times[-1]:.3g} s {path.fault}"
     if path.rows.is_hot:
         runaway = _runaway(machine, path)
         reason = f"{runaway}after {times[-1]:.3g} s a temperature passes what any oil bears"
         return "seizure" if runaway else "no steady state", reason
-    operating = turning_speed(machine.scene), math.hypot(*machine.scene.operation.load[:2])
+    operating = turning_speed(machine.scene.operation.speeds), math.hypot(*machine.scene.operation.load[:2])
     ends_there = tuple(machine.course.at(times[-1])) == operating
     gap = float(np.abs(nodes[-1, : len(NODES)] - machine.search.last.temperatures).max())
-    ceiling, over = oil_ceiling(thermal, lubricant), np.flatnonzero(nodes[:, OIL] > oil_ceiling(thermal, lubricant))
-    if over.size:
+    ceiling = oil_ceiling(machine.thermal, given(machine.scene.lubricant))
+    if (over := np.flatnonzero(nodes[:, OIL] > ceiling)).size:
         return "too hot", f"after {times[over[0]]:.3g} s the oil passes its ceiling of {ceiling:g} C"
     if ends_there and machine.search.status == "steady" and gap > warming.STEADY:
         return "undecided", f"it ends {gap:.0f} K from the steady state of the first guess, so the balance has several"
@@ -320,10 +311,9 @@ def _errors(machine: Machine, path: Path) -> dict[str, float]:
 
 def radial_clearance(hot: SingleRowScene, thermal: Thermal, nodes: Array) -> Array:
     """Diametral clearance [um] at temperatures (..., 6) [C] and the speed of a scene at stated temperatures."""
-    assert hot.mounting is not None
     at = Temperatures(*np.moveaxis(nodes[..., : len(NODES)], -1, 0))
     keys = part_temperatures(thermal, at, cage=False, seats=(nodes[..., warming.HOUSING], nodes[..., warming.SHAFT]))
-    change = row_change(hot.model_copy(update={"mounting": hot.mounting.model_copy(update=keys)}))
+    change = row_change(hot.model_copy(update={"mounting": given(hot.mounting).model_copy(update=keys)}))
     row, angle = hot.bearing, hot.bearing.contact_angle
     between = row.groove_centre_distance
     radial = between * math.cos(angle) + row.interference_m + change.radial
@@ -423,7 +413,7 @@ def _clearances_of_sets(machine: Machine, rows: warming.Warming, thermals: Seque
     lag = machine.thermal.model_copy(update={"shaft_lag": np.array([thermal.shaft_lag for thermal in thermals])})
     still = hot.model_copy(update={"mounting": hot.mounting.model_copy(update={"rotation": False})})
     turning, resting = (radial_clearance(scene, lag, rows.temperatures) for scene in (hot, still))
-    ratios = (speeds / turning_speed(hot))[:, np.newaxis]
+    ratios = (speeds / turning_speed(hot.operation.speeds))[:, np.newaxis]
     lead = rows.temperatures[..., INNER] - rows.temperatures[..., OUTER]
     return {"radial_um": resting + (turning - resting) * ratios**2, DIFFERENCE: lead}
 

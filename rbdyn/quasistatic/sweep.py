@@ -21,7 +21,7 @@ from pydantic import ValidationError
 
 from rbdyn.base.arrays import Array
 from rbdyn.base.blocks import Column, Sheet
-from rbdyn.base.faults import InputError, number_list, refuse, validated
+from rbdyn.base.faults import InputError, given, number_list, refuse, validated
 from rbdyn.base.files import Checkpoint, code_version, run_key, versions
 from rbdyn.base.notes import Note, Notes
 from rbdyn.base.records import Record, derived, finite, keyed, outside_json, save_table
@@ -331,8 +331,7 @@ def _solve(scene: BallScene, before: tuple[Solution, ...]) -> PointRecord:
         nothing = {name: np.full((size, FIGURES), np.nan) for name, size in zip(rows, sizes, strict=True)}
         return PointRecord(result.status, {}, nothing, [], (), not started)
     report = result.reached
-    assert report.reaction is not None
-    figures = ring_figures(result.displacement, report.reaction, report.stiffness)
+    figures = ring_figures(result.displacement, given(report.reaction), report.stiffness)
     found = tipping(result.displacement, scene)
     for name, rating, solution in zip(rows, result.ratings, result.rows, strict=True):
         found += remarks(solution, rating, name.removeprefix("row"))

@@ -21,7 +21,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rbdyn.base.arrays import Array
-from rbdyn.base.faults import RPM, InputError
+from rbdyn.base.faults import RPM, InputError, given
 from rbdyn.base.notes import Note, Notes
 from rbdyn.contact import point_contact
 from rbdyn.contact.point_contact import PointContact
@@ -70,8 +70,7 @@ def at_temperatures(
 
     It is a copy without validation: temperatures are numbers of the balance, and an impossible bearing shows in its equilibrium.
     """
-    thermal, lubricant, mounting = scene.thermal, scene.lubricant, scene.mounting
-    assert thermal is not None and lubricant is not None and mounting is not None
+    thermal, lubricant, mounting = given(scene.thermal), given(scene.lubricant), given(scene.mounting)
     oil: dict[str, Any] = {"temperature_C": temperatures.oil, "film_temperature": "parts"}
     if lubricant.viscosity_mPas is not None:
         oil["viscosity_mPas"] = 1e3 * lubricant.at(temperatures.oil).viscosity
@@ -138,17 +137,15 @@ def loads_of(scene: SingleRowScene, model: RowModel, solution: Solution) -> Load
 
 def running_of(scene: SingleRowScene) -> friction.Running:
     """Sizes, speed and oil of a row at the temperature of its oil, for SKF's model."""
-    lubricant, mounting, (inner, outer) = scene.lubricant, scene.mounting, scene.operation.speeds
-    assert lubricant is not None and mounting is not None
+    lubricant, mounting, (inner, outer) = given(scene.lubricant), given(scene.mounting), scene.operation.speeds
     oil, sizes = lubricant.in_service, (mounting.bore, mounting.outside_diameter)
     return friction.Running(*sizes, inner - outer, oil.viscosity / oil.density, lubricant.supply)
 
 
 def friction_of(scene: SingleRowScene, model: RowModel, loads: Loads) -> friction.FrictionMoments:
     """SKF's moments [N m] of a row at the temperature of its oil."""
-    lubricant, running = scene.lubricant, running_of(scene)
-    assert lubricant is not None
-    film = friction.MINERAL_FILM if lubricant.base_oil_name in MINERAL else friction.SYNTHETIC_FILM
+    running, base = running_of(scene), given(scene.lubricant).base_oil_name
+    film = friction.MINERAL_FILM if base in MINERAL else friction.SYNTHETIC_FILM
     if scene.bearing.kind == "deep_groove_ball":
         series = SERIES[diameter_series(1e3 * running.bore, 1e3 * running.outside)]
         assert series in friction.DEEP_GROOVE
@@ -184,9 +181,7 @@ def contact_conductance(scene: SingleRowScene, contact: PointContact, race: str,
     The film h is that of pure rolling at the temperature of its surfaces, reduced by inlet heating; the oil in it conducts as
     at ambient pressure.
     """
-    drawing, lubricant = scene.bearing, scene.lubricant
-    assert lubricant is not None
-    oil = lubricant.at(race_film_temperature(scene, race))
+    drawing, oil = scene.bearing, given(scene.lubricant).at(race_film_temperature(scene, race))
     ball, ring = scene.material("ball"), scene.material(f"{race}_ring")
     gamma = drawing.gamma if race == "inner" else -drawing.gamma
     speed = point_contact.entrainment_speed(drawing.pitch_diameter, drawing.gamma, *scene.operation.speeds)
@@ -204,9 +199,8 @@ def contact_conductance(scene: SingleRowScene, contact: PointContact, race: str,
 
 def conductances_of(scene: SingleRowScene, thermal: Thermal, model: RowModel, solution: Solution) -> Conductances:
     """Network of a row at temperatures. Its surfaces are the cylinders of the raceways over the width, and the balls; no cage."""
-    lubricant, mounting, drawing = scene.lubricant, scene.mounting, scene.bearing
-    assert lubricant is not None and mounting is not None and mounting.width is not None
-    oil, width = lubricant.in_service, mounting.width
+    lubricant, mounting, drawing = given(scene.lubricant), given(scene.mounting), scene.bearing
+    oil, width = lubricant.in_service, given(mounting.width)
     inner, outer = raceway_radii(drawing)
     cage = cage_speed(drawing, *scene.operation.speeds)
     transfer = thermal.surface_factor * surface_coefficient(oil, cage, drawing.pitch_diameter)
@@ -227,8 +221,7 @@ def heat_at(scene: SingleRowScene, nodes: Array, seats: tuple[float, float] | No
 
     Raises InputError where it has no equilibrium or is overloaded there.
     """
-    thermal = scene.thermal
-    assert thermal is not None and scene.lubricant is not None
+    thermal = given(scene.thermal)
     hot = at_temperatures(scene, Temperatures(*nodes.tolist()), seats)
     model = row_of(hot)
     solution = solve(model.row, model.control, load_of(hot), constraint_of(hot))
@@ -241,7 +234,7 @@ def heat_at(scene: SingleRowScene, nodes: Array, seats: tuple[float, float] | No
         raise InputError(f"the bearing at {places} C: {status}")
     loads = loads_of(hot, model, solution)
     moments = friction_of(hot, model, loads)
-    boundaries = Boundaries(inlet_temperature(thermal, scene.lubricant), thermal.ambient_C)
+    boundaries = Boundaries(inlet_temperature(thermal, given(scene.lubricant)), thermal.ambient_C)
     return Heat(
         hot,
         model,
@@ -260,13 +253,12 @@ def balance(scene: SingleRowScene, nodes: Array, viscosity: Array | None = None)
 
     ``viscosity``: ``log_viscosity`` of the oil where another scene has it, which takes longer than all else. Raises InputError as ``heat_at``.
     """
-    assert scene.lubricant is not None
     found = heat_at(scene, nodes)
     films = np.zeros((len(TERMS), len(NODES)))
     films[:, OIL] = 1.0
     exponents = np.array([ROLLING_POWER * term.endswith("rolling_resistance") for term in TERMS])
     if viscosity is None:
-        viscosity = scene.once("log_viscosity", partial(log_viscosity, scene.lubricant.at))
+        viscosity = scene.once("log_viscosity", partial(log_viscosity, given(scene.lubricant).at))
     losses = Losses(nodes, found.powers, exponents, films, viscosity)
     model = HeatModel(losses, found.shares, found.conductances, found.boundaries, no_residue())
     image = temperatures(found.conductances, found.boundaries, found.heat)
@@ -300,9 +292,9 @@ def steady_temperatures(scene: SingleRowScene) -> Search:
     It starts at the first guess of the oil's temperature, and where that leads to no stable state also at that of the cold bearing.
     Raises InputError where the bearing is impossible even when cold.
     """
-    assert scene.thermal is not None and scene.lubricant is not None
-    cold = np.full(len(NODES), inlet_temperature(scene.thermal, scene.lubricant))
-    guess = np.full(len(NODES), scene.lubricant.temperature_C)
+    lubricant = given(scene.lubricant)
+    cold = np.full(len(NODES), inlet_temperature(given(scene.thermal), lubricant))
+    guess = np.full(len(NODES), lubricant.temperature_C)
     for start in (guess, cold):
         search = steady_state(partial(balance, scene), start, cold, _exact_slopes, partial(_model, scene), TOLERANCE)
         if search.status == "steady":
@@ -358,8 +350,7 @@ def with_temperatures(
 
 def _seized_cold(scene: SingleRowScene, reason: str, solve: Callable[[SingleRowScene], BallResult]) -> BallResult:
     """The result of a bearing that is impossible before any heat."""
-    assert scene.thermal is not None and scene.lubricant is not None
-    nodes = dict.fromkeys(NODES, inlet_temperature(scene.thermal, scene.lubricant))
+    nodes = dict.fromkeys(NODES, inlet_temperature(given(scene.thermal), given(scene.lubricant)))
     cold = solve(at_temperatures(scene, Temperatures(**nodes)))
     thermal = ColdSeizure("seizure", reason, None, [nodes])
     input_scene = scene.model_dump(mode="json")
@@ -368,15 +359,13 @@ def _seized_cold(scene: SingleRowScene, reason: str, solve: Callable[[SingleRowS
 
 def ceiling_verdict(scene: SingleRowScene, nodes: dict[str, float]) -> tuple[str, str]:
     """Status and reason of steady temperatures [C]: "too hot" with oil above its ceiling."""
-    assert scene.thermal is not None and scene.lubricant is not None
-    excess = over_ceiling("oil", nodes["oil"], oil_ceiling(scene.thermal, scene.lubricant))
+    excess = over_ceiling("oil", nodes["oil"], oil_ceiling(given(scene.thermal), given(scene.lubricant)))
     return ("too hot", excess) if excess else ("steady", "")
 
 
 def ranges_of(scene: SingleRowScene, state: State, slopes: Array) -> Ranges:
     """Ranges of steady temperatures over the documented inputs of the balance, by a full solution for each input set."""
-    assert scene.thermal is not None and scene.lubricant is not None
-    cold = np.full(len(NODES), inlet_temperature(scene.thermal, scene.lubricant))
+    cold = np.full(len(NODES), inlet_temperature(given(scene.thermal), given(scene.lubricant)))
     about = state.model.with_image_slopes(slopes)
 
     def near(states: Sequence[State]) -> HeatModel:
@@ -424,10 +413,7 @@ def _record(scene: SingleRowScene, search: Search, ranges: Ranges, status: str, 
 
 def _notes(scene: SingleRowScene, found: Heat, ranges: Ranges) -> Iterator[Note]:
     """What the heat balance leaves open."""
-    kind, (inner, outer), mounting = scene.bearing.kind, scene.operation.speeds, scene.mounting
-    thermal, lubricant = scene.thermal, scene.lubricant
-    assert mounting is not None and mounting.width is not None
-    assert thermal is not None and lubricant is not None
+    kind, (inner, outer), mounting = scene.bearing.kind, scene.operation.speeds, given(scene.mounting)
     level = (
         f"temperatures: their heat is SKF's friction model, {LEVELS[kind]} times the heat of ISO 15312 at reference speed, which no "
         "range includes"
@@ -443,7 +429,7 @@ def _notes(scene: SingleRowScene, found: Heat, ranges: Ranges) -> Iterator[Note]
         yield Note("unverified", sentence)
     yield from starvation_note(found.scene, "temperatures")
     yield from ranges.notes
-    yield from heat_notes(thermal, lubricant, mounting, mounting.width)
+    yield from heat_notes(given(scene.thermal), given(scene.lubricant), mounting, given(mounting.width))
 
 
 def starvation_note(hot: SingleRowScene, subject: str) -> Notes:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self, cast
 
 from pydantic import Field, model_validator
 
-from rbdyn.base.faults import RPM, SI, Consistent, NonNegative, NotVanishing, OptionalSI, Positive, Strict
+from rbdyn.base.faults import RPM, SI, Consistent, NonNegative, NotVanishing, OptionalSI, Positive, Strict, given
 from rbdyn.base.words import counted
 from rbdyn.properties.materials import Material
 from rbdyn.scene.bearing import CustomMaterial, Harmonic, MaterialName, material_of
@@ -153,8 +153,7 @@ class BallRow(Consistent):
     def contact_angle(self) -> float:
         """Unloaded contact angle [rad], stated or from the clearance; 0 for an interference."""
         if self.radial_clearance_mm is None:
-            assert self.contact_angle_deg is not None
-            return math.radians(self.contact_angle_deg)
+            return math.radians(given(self.contact_angle_deg))
         return math.acos(min(1.0 - self.radial_clearance_mm / (2.0 * self.groove_centre_distance_mm), 1.0))
 
     @property

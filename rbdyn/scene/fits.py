@@ -2,7 +2,7 @@
 
 from typing import Any, NamedTuple
 
-from rbdyn.base.faults import RPM
+from rbdyn.base.faults import RPM, given
 from rbdyn.base.records import Record, finite
 from rbdyn.mounting.cage import CageBody, CageClearances, guide_clearance, pocket_circle_shift, pocket_clearance
 from rbdyn.mounting.rings import (
@@ -133,12 +133,10 @@ def race_film_temperature(scene: BallScene, race: str) -> float:
 
     That of the oil, or with ``film_temperature = "parts"`` the mean of both surfaces.
     """
-    lubricant, mounting = scene.lubricant, scene.mounting
-    assert lubricant is not None
+    lubricant, mounting = given(scene.lubricant), scene.mounting
     if lubricant.film_temperature == "oil" or mounting is None:
         return lubricant.temperature_C
-    rings = mounted_of(scene)
-    assert rings is not None
+    rings = given(mounted_of(scene))
     ring = rings.inner_ring if race == "inner" else rings.outer_ring
     return mounting.reference_temperature_C + 0.5 * (ring.temperature_rise + rings.element_temperature_rise)
 
@@ -216,11 +214,9 @@ def _pair(scene: BallScene) -> RingPair:
     inner = outer = None
     # A ring at rest does not grow, so its bore or outside diameter may be missing.
     if inner_speed != 0.0:
-        assert below.bore is not None
-        inner = Ring(0.5 * below.bore, inner_race, scene.material("inner_ring"), speed=inner_speed)
+        inner = Ring(0.5 * given(below.bore), inner_race, scene.material("inner_ring"), speed=inner_speed)
     if outer_speed != 0.0:
-        assert above.outside_diameter is not None
-        outer = Ring(outer_race, 0.5 * above.outside_diameter, scene.material("outer_ring"), speed=outer_speed)
+        outer = Ring(outer_race, 0.5 * given(above.outside_diameter), scene.material("outer_ring"), speed=outer_speed)
     return RingPair(inner, outer)
 
 
@@ -241,5 +237,4 @@ def _between(scene: BallScene, row: BallRow, inner: Ring | None, outer: Ring | N
 def _printed(scene: BallScene, row: BallRow, ring: str, speed: float) -> float:
     if speed == 0.0:
         return 0.0
-    assert row.bore is not None
-    return printed_growth(row.pitch_diameter, row.bore, scene.material(ring), speed)
+    return printed_growth(row.pitch_diameter, given(row.bore), scene.material(ring), speed)

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from rbdyn.base.arrays import Array
+from rbdyn.base.faults import given
 from rbdyn.clearances import DIFFERENCE
 from rbdyn.result import Ranges
 from rbdyn.thermal.losses import HOTTEST, TERMS, HeatModel
@@ -66,10 +67,8 @@ def input_ranges(
     ``estimated``: keys of the scene whose stated values are estimates. Without ``full`` the model's answers count. Sets whose temperatures run away, or beyond what any oil
     bears, count as without a steady state and as the hottest; their clearances are left out.
     """
-    thermal = scene.thermal
-    assert thermal is not None
     sets = input_sets(scene, levels, estimated)
-    varied = list(varied_inputs(thermal, sets, levels))
+    varied = list(varied_inputs(given(scene.thermal), sets, levels))
     dry, wet = shares(0.0), shares(1.0)
     to_oil = np.array([changed.film_share_to_oil for changed, *_ in varied])[:, np.newaxis, np.newaxis]
     ratios = {name: np.array([each[name] for _, each, _ in varied]) for name in varied[0][1]}
@@ -188,8 +187,7 @@ def input_sets(
     from rbdyn.scene.uncertain import documented
     from rbdyn.scene.unknown import plain_values
 
-    thermal, present = scene.thermal, plain_values(scene)
-    assert thermal is not None
+    thermal, present = given(scene.thermal), plain_values(scene)
     stated = {f"{table}.{key}" for table in ("lubricant", "model") for key in scene._tables.get(table, {})}
     stated |= {f"thermal.{key}" for key in thermal.model_fields_set}
     stated |= {f"thermal.start.{key}" for key in ([] if thermal.start is None else thermal.start.model_fields_set)}

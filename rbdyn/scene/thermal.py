@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NamedTuple
 
 from pydantic import Field
 
-from rbdyn.base.faults import Consistent, InputError, InSI, NonNegative, Positive, Share, Sparse, Strict
+from rbdyn.base.faults import Consistent, InputError, InSI, NonNegative, Positive, Share, Sparse, Strict, given
 from rbdyn.scene.lubricant import HOTTEST_C, THICKEST, Lubricant, OilCelsius
 from rbdyn.scene.operation import SLOWEST_RPM, Load, Mounting, schedule_faults
 
@@ -268,8 +268,7 @@ def film_temperatures(scene: "Scene", rings: "MountedRings | None") -> FilmTempe
         return FilmTemperatures(oil, oil, oil, oil, oil)
     reference = mounting.reference_temperature_C
     outer, inner = reference + rings.outer_ring.temperature_rise, reference + rings.inner_ring.temperature_rise
-    rollers, cage = reference + rings.element_temperature_rise, scene.cage_temperature_C
-    assert cage is not None
+    rollers, cage = reference + rings.element_temperature_rise, given(scene.cage_temperature_C)
     guide = {"outer": outer, "inner": inner, "roller": rollers}[scene.cage.guidance]
     return FilmTemperatures(
         oil, 0.5 * (outer + rollers), 0.5 * (inner + rollers), 0.5 * (cage + rollers), 0.5 * (cage + guide)
@@ -289,8 +288,7 @@ def oil_ceiling(thermal: Thermal, lubricant: Lubricant) -> float:
 
 def ceilings(scene: "Scene") -> dict[str, float]:
     """Highest allowed temperature [C] of "oil" and "cage"; without an entry for a cage that endures any."""
-    thermal = scene.thermal
-    assert thermal is not None
+    thermal = given(scene.thermal)
     oil = oil_ceiling(thermal, scene.lubricant)
     name = scene.materials.cage
     cage = thermal.cage_ceiling_C
@@ -301,10 +299,14 @@ def ceilings(scene: "Scene") -> dict[str, float]:
 
 def too_hot(scene: "Scene", temperatures: Mapping[str, float]) -> str:
     """A sentence on the oil or the cage above its ceiling at temperatures of the nodes [C]; empty where both are below."""
-    assert scene.thermal is not None
-    parts = {"oil": temperatures["oil"], "cage": temperatures["rollers"] + scene.thermal.cage_offset_K}
+    parts = {"oil": temperatures["oil"], "cage": temperatures["rollers"] + given(scene.thermal).cage_offset_K}
     excesses = (over_ceiling(part, parts[part], ceiling) for part, ceiling in ceilings(scene).items())
     return "; ".join(filter(None, excesses))
+
+
+def turning_speed(speeds: tuple[float, float]) -> float:
+    """Of inner and outer ring that of the inner one, or of the outer one where the inner ring stands still, without a sign [rad/s]."""
+    return abs(speeds[0]) or abs(speeds[1])
 
 
 def inlet_temperature(thermal: Thermal, lubricant: Lubricant) -> float:
@@ -431,15 +433,13 @@ def at_temperatures(scene: "Scene", temperatures: Temperatures, seats: tuple[flo
 
     ``seats``: as of ``part_temperatures``. Raises InputError where it is impossible at these temperatures, such as a cage that seizes.
     """
-    thermal = scene.thermal
-    assert thermal is not None
     tables = deepcopy(scene._tables)
     del tables["thermal"]
     oil = temperatures.oil
     tables["lubricant"] |= {"temperature_C": oil, "film_temperature": "parts"}
     if scene.lubricant.viscosity_mPas is not None:
         tables["lubricant"]["viscosity_mPas"] = 1e3 * scene.lubricant.at(oil).viscosity
-    tables["mounting"] |= part_temperatures(thermal, temperatures, seats=seats)
+    tables["mounting"] |= part_temperatures(given(scene.thermal), temperatures, seats=seats)
     return scene.from_dict(tables, f"the bearing at {oil:.4g} C")
 
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rbdyn.base.arrays import Array
-from rbdyn.base.faults import InputError
+from rbdyn.base.faults import InputError, given
 from rbdyn.base.notes import Note
 from rbdyn.contact.rolling_resistance import rolling_force
 from rbdyn.dynamics.forces.equations import RollerBearing
@@ -111,9 +111,9 @@ def heat_model(hot: Scene, network: Network, temperatures: Array, powers: Array,
 
 def ring_width(scene: Scene) -> float:
     """Width of the rings [m], stated or that of the designation. Raises InputError without either."""
-    assert scene.mounting is not None
-    if scene.mounting.width is not None:
-        return scene.mounting.width
+    width = given(scene.mounting).width
+    if width is not None:
+        return width
     listed = catalogue_entry(scene.bearing)
     if listed is None:
         raise InputError("mounting.width_mm: missing; the heat balance needs the width of the rings")
@@ -121,8 +121,7 @@ def ring_width(scene: Scene) -> float:
 
 
 def _conductances(hot: Scene, thermal: Thermal, bearing: RollerBearing) -> Conductances:
-    mounting, lubricant, cage, geometry = hot.mounting, hot.lubricant, hot.cage, hot.geometry
-    assert mounting is not None
+    mounting, lubricant, cage, geometry = given(hot.mounting), hot.lubricant, hot.cage, hot.geometry
     oil, width = hot.oil(), ring_width(hot)
     radii = geometry.land_radius, geometry.rim_radius
     size = CageSize(max(radii), min(radii), hot.bearing.roller_length + cage.lands * cage.land_width)

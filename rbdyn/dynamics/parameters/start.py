@@ -7,12 +7,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rbdyn.base.arrays import Array
-from rbdyn.base.faults import RPM
+from rbdyn.base.faults import RPM, given
 from rbdyn.dynamics.parameters.heat import cavity_of, ring_width
 from rbdyn.mounting.rings import MountedRings
 from rbdyn.scene import Scene
 from rbdyn.scene.fits import mounted_rings
-from rbdyn.scene.thermal import Temperatures, Thermal, part_temperatures
+from rbdyn.scene.thermal import Temperatures, Thermal, part_temperatures, turning_speed
 from rbdyn.thermal import start as warming
 from rbdyn.thermal.fixed_point import State
 from rbdyn.thermal.network import NODES, Boundaries
@@ -26,8 +26,6 @@ def capacities(scene: Scene, thermal: Thermal) -> Array:
 
     The oil is what the cavity holds: full for a bath, which has as much again at its sides, else the oil fraction.
     """
-    start = thermal.start
-    assert start is not None
     rollers = (
         scene.bearing.rollers * scene.geometry.roller_mass * scene.material("roller").heat_capacity
         + scene.cage.mass * scene.material("cage").heat_capacity
@@ -35,13 +33,12 @@ def capacities(scene: Scene, thermal: Thermal) -> Array:
     oil = scene.oil()
     fill = 1.0 if scene.lubricant.supply == "bath" else scene.lubricant.oil_fraction
     full = fill * cavity_of(scene) * oil.density * oil.heat_capacity
-    return warming.capacities_of(_rings(scene), ring_width(scene), start.widths, full, rollers)
+    return warming.capacities_of(_rings(scene), ring_width(scene), given(thermal.start).widths, full, rollers)
 
 
 def _rings(scene: Scene) -> MountedRings:
-    assert scene.mounting is not None
     material = scene.material("rings")
-    return mounted_rings(scene.mounting, scene.bearing, material, material, *scene.operation.speeds)
+    return mounted_rings(given(scene.mounting), scene.bearing, material, material, *scene.operation.speeds)
 
 
 def seats_of(hot: Scene) -> warming.Seats:
@@ -61,13 +58,11 @@ def clearances_at(hot: Scene, thermal: Thermal, temperatures: Array, speed_ratio
 
     ``hot``: the scene with stated temperatures, whose own do not count. ``left``: of what seizes, by name.
     """
-    mounting = hot.mounting
-    assert mounting is not None
     nodes = Temperatures(*np.moveaxis(temperatures[..., : len(NODES)], -1, 0))
     keys = part_temperatures(
         thermal, nodes, seats=(temperatures[..., warming.HOUSING], temperatures[..., warming.SHAFT])
     )
-    turning = mounting.model_copy(update=keys)
+    turning = given(hot.mounting).model_copy(update=keys)
     found = [_clearances(hot, turning), _clearances(hot, turning.model_copy(update={"rotation": False}))]
 
     def blend(name: str, place: int) -> Array:
@@ -85,17 +80,11 @@ def _clearances(hot: Scene, mounting: Any) -> tuple[Mapping[str, Any], Mapping[s
     return plays, left
 
 
-def turning_speed(scene: Scene) -> float:
-    """Speed of the inner ring, or of the outer one where the inner ring stands still, without a sign [rad/s]."""
-    inner, outer = scene.operation.speeds
-    return abs(inner) if inner else abs(outer)
-
-
 def at_point(scene: Scene, speed: float, load: float) -> Scene:
     """The scene at another speed [rad/s] and load [N]; both rings keep their ratio. Raises InputError."""
-    if (speed, load) == (turning_speed(scene), scene.operation.radial_load_N):
+    if (speed, load) == (turning_speed(scene.operation.speeds), scene.operation.radial_load_N):
         return scene
-    inner, outer = (speed / turning_speed(scene) * value / RPM for value in scene.operation.speeds)
+    inner, outer = (speed / turning_speed(scene.operation.speeds) * value / RPM for value in scene.operation.speeds)
     return scene.changed(
         {"operation.inner_speed_rpm": inner, "operation.outer_speed_rpm": outer, "operation.radial_load_N": load}
     )
@@ -121,7 +110,7 @@ class Machine(NamedTuple):
         self, rows: warming.Warming, thermal: Thermal | None = None
     ) -> tuple[dict[str, Array], dict[str, Array]]:
         """Clearances [um] by name over time, and what is left of those that may not be lost."""
-        speeds = self.course.at(rows.times)[0] / turning_speed(self.scene)
+        speeds = self.course.at(rows.times)[0] / turning_speed(self.scene.operation.speeds)
         ratios = speeds.reshape(-1, *[1] * (rows.temperatures.ndim - 2))
         return clearances_at(self.hot, thermal or self.thermal, rows.temperatures, ratios)
 
