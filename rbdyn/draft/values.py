@@ -281,18 +281,18 @@ def _side_ring(subject: Subject, landed: bool) -> Values:
 
 def ball_values(subject: Subject, options: Options) -> Values:
     """Values of ``ball_scene.toml``. Raises ValueError as ``roller_values``."""
-    from rbdyn.life.balls import dynamic_capacity
+    from rbdyn.life.balls import rated_capacity
 
     inside, is_own = subject.inside, subject.grooves is not None
     assert isinstance(inside, catalogue.BallInterior)
     deep, angle = inside.contact_angle is None, math.radians(inside.contact_angle or 0.0)
     sizes = inside.balls, inside.ball_diameter * 1e-3, inside.pitch_diameter * 1e-3, angle
-    capacity = dynamic_capacity(*sizes, *(subject.grooves or ()))
+    inner, outer = subject.grooves or USUAL_GROOVES
+    capacity = rated_capacity(*sizes, inner, outer)
     common = _common(subject, options, BALL_SPEEDS[subject.kind] / inside.pitch_diameter, capacity)
     preload, assumed = options.preload, options.preload is None and not deep
     if assumed:
         preload = float(f"{max(USUAL_PRELOAD * capacity, HALF_LOADED * common['load'] * math.tan(angle)):.2g}")
-    inner, outer = subject.grooves or USUAL_GROOVES
     return common | {
         **(_clearance(subject) if deep else {}),
         "ratings": _rated(subject, capacity),

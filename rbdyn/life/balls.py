@@ -25,6 +25,8 @@ FASTEST = {"deep_groove_ball": 1.2e3 * RPM, "angular_contact_ball": 0.7e3 * RPM}
 REDUCTION = 0.95
 CAPACITY_CONSTANT = 0.41 * 98.0665
 RATING_FACTOR = 1.3  # b_m of ball bearings of contemporary steel
+# Widest grooves, inner and outer, that ISO 281 rates by its table of f_c, which is that of RATED_GROOVE.
+WIDEST_RATED, RATED_GROOVE = (0.52, 0.53), 0.52
 LARGEST_PLAIN_BALL = 25.4  # [mm]; above, capacity grows as the power 1.4 of the diameter
 STATIC_PRESSURE = 4.2e9  # [Pa]
 MOST_LOADED = 5.0  # Stribeck's Q_max Z cos(alpha)/F_r
@@ -45,7 +47,7 @@ def ball_size_term(ball_diameter: float) -> float:
 def capacity_factor(gamma: float, inner_groove_factor: float = 0.52, outer_groove_factor: float = 0.52) -> float:
     """f_c of a radial or angular contact ball bearing (ISO 281, in N and mm), gamma = D cos(alpha)/d_m.
 
-    The standard's own table holds for 0.52, also for closer grooves.
+    ``rated_capacity`` has the grooves for which the standard's own table holds.
     """
     inner_to_outer = 1.04 * ((1.0 - gamma) / (1.0 + gamma)) ** 1.72
     inner_to_outer *= groove_ratio(inner_groove_factor, outer_groove_factor)
@@ -72,6 +74,21 @@ def dynamic_capacity(
     gamma = ball_diameter * math.cos(contact_angle) / pitch_diameter
     factor = rating_factor * capacity_factor(gamma, inner_groove_factor, outer_groove_factor)
     return factor * (rows * math.cos(contact_angle)) ** 0.7 * balls ** (2.0 / 3.0) * ball_size_term(ball_diameter)
+
+
+def rated_capacity(
+    balls: int,
+    ball_diameter: float,
+    pitch_diameter: float,
+    contact_angle: float,
+    inner_groove_factor: float,
+    outer_groove_factor: float,
+) -> float:
+    """C_r [N] as ISO 281 rates a row: grooves up to ``WIDEST_RATED`` by the standard's table, wider ones lower as in its theory."""
+    sizes = balls, ball_diameter, pitch_diameter, contact_angle
+    grooves = map(max, (inner_groove_factor, outer_groove_factor), WIDEST_RATED)
+    tabled = dynamic_capacity(*sizes, RATED_GROOVE, RATED_GROOVE)
+    return tabled * dynamic_capacity(*sizes, *grooves) / dynamic_capacity(*sizes, *WIDEST_RATED)
 
 
 def static_capacity(balls: int, contact_angle: float, races: tuple[PointContact, PointContact]) -> float:

@@ -497,7 +497,7 @@ def layer_frictions(scene: DoubleDeckerScene) -> tuple[LayerFriction, LayerFrict
 def static_capacity(row: BallRow, races: tuple[PointContact, PointContact]) -> float:
     """Static capacity C0 [N], from the catalogue or from its defining pressure."""
     catalogue = row.static_capacity_N
-    return balls.static_capacity(row.balls, row.contact_angle, races) if catalogue is None else catalogue
+    return balls.static_capacity(row.balls, row.rated_angle, races) if catalogue is None else catalogue
 
 
 def middle_ring(model: DoubleDeckerModel, solution: DoubleDeckerSolution) -> MiddleRing:

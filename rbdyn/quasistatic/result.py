@@ -21,7 +21,7 @@ from rbdyn.contact.film_thickness import lambda_ratio
 from rbdyn.contact.hertz_line import BALLS, SHAKEDOWN, dent_sentence, overload_sentence
 from rbdyn.contact.point_contact import PointContact, peak_pressure
 from rbdyn.life import Life, LifeFigures, Turning, turning_rings
-from rbdyn.life.balls import dynamic_capacity, rated_capacities, row_life
+from rbdyn.life.balls import rated_capacities, rated_capacity, row_life
 from rbdyn.properties.materials import equivalent_modulus
 from rbdyn.quasistatic.row.ball import FixedShare, FrictionShare
 from rbdyn.quasistatic.row.equilibrium import INNER_ANGLE, INNER_LOAD, MOMENT, OUTER_ANGLE, OUTER_LOAD, PULL, Solution
@@ -35,23 +35,19 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
-# Smallest groove factor in the table of ISO 281; closer grooves get no higher rating.
-CLOSEST_RATED = 0.52
-
-
 def capacity_of(drawing: BallRow) -> float:
     """C_r of a row [N], from the catalogue or else by ISO 281 from the dimensions."""
     if drawing.dynamic_capacity_N is not None:
         return drawing.dynamic_capacity_N
-    inner, outer = (max(factor, CLOSEST_RATED) for factor in drawing.groove_factors)
-    sizes = drawing.balls, drawing.ball_diameter, drawing.pitch_diameter, drawing.contact_angle
-    return dynamic_capacity(*sizes, inner, outer)
+    sizes = drawing.balls, drawing.ball_diameter, drawing.pitch_diameter, drawing.rated_angle
+    return rated_capacity(*sizes, *drawing.groove_factors)
 
 
 def reference_capacities(drawing: BallRow) -> tuple[float, float]:
     """Ball loads [N] that the inner and the outer race bear for 1e6 turns by ISO/TS 16281."""
-    angle = drawing.contact_angle
-    return rated_capacities(capacity_of(drawing), drawing.balls, drawing.gamma, angle, *drawing.groove_factors)
+    angle = drawing.rated_angle
+    gamma = drawing.ball_diameter * math.cos(angle) / drawing.pitch_diameter
+    return rated_capacities(capacity_of(drawing), drawing.balls, gamma, angle, *drawing.groove_factors)
 
 
 def solution_life(solution: Solution, capacities: tuple[float, float], turning: Turning = "inner") -> Life:

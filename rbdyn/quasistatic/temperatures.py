@@ -116,7 +116,7 @@ def static_capacity_of(scene: SingleRowScene, model: RowModel) -> float:
     stated = scene.bearing.static_capacity_N
     if stated is not None:
         return stated
-    return static_capacity(scene.bearing.balls, scene.bearing.contact_angle, (model.inner_contact, model.outer_contact))
+    return static_capacity(scene.bearing.balls, scene.bearing.rated_angle, (model.inner_contact, model.outer_contact))
 
 
 def loads_of(scene: SingleRowScene, model: RowModel, solution: Solution) -> Loads:

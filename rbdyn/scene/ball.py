@@ -157,6 +157,11 @@ class BallRow(Consistent):
         return math.acos(min(1.0 - self.radial_clearance_mm / (2.0 * self.groove_centre_distance_mm), 1.0))
 
     @property
+    def rated_angle(self) -> float:
+        """Nominal contact angle of load ratings [rad]."""
+        return self.contact_angle
+
+    @property
     def gamma(self) -> float:
         """Ball over pitch diameter, in the plane of the unloaded contacts: D cos a_0/d_m."""
         return self.ball_diameter_mm * math.cos(self.contact_angle) / self.pitch_diameter_mm
@@ -179,6 +184,11 @@ class BallBearing(BallRow):
 
     kind: Literal["angular_contact_ball", "deep_groove_ball"]
     """Kind of bearing."""
+
+    @property
+    def rated_angle(self) -> float:
+        """Nominal contact angle of load ratings [rad]: 0 of a deep groove bearing (ISO 281), whatever its clearance."""
+        return 0.0 if self.kind == "deep_groove_ball" else self.contact_angle
 
 
 class MiddleRing(Strict):

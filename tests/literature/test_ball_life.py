@@ -69,6 +69,23 @@ def test_literature_commercial_report(clearance, radial, axial, x, z, tilt, mill
     assert standard.load == pytest.approx(rest.load, rel=1e-9, abs=1e-6)
 
 
+@pytest.mark.parametrize(("clearance", "radial", "axial", "x", "z", "tilt", "million"), REPORT)
+def test_literature_commercial_report_of_a_scene(clearance, radial, axial, x, z, tilt, million):
+    """Literature: the same report from a scene at rest. The standard rates by the nominal angle, 0, whatever the clearance."""
+    steel = {"elastic_modulus_GPa": 210.0, "poisson_ratio": 0.3, "density_kg_m3": 7800.0}
+    row = {"kind": "deep_groove_ball", "balls": 7, "ball_diameter_mm": 11.5, "pitch_diameter_mm": 43.5}
+    grooves = {"inner_groove_factor": 0.52, "outer_groove_factor": 0.53, "radial_clearance_mm": 1e-3 * clearance}
+    load = {"radial_load_N": radial, "axial_load_N": axial, "tilt": "free" if tilt else "fixed"}
+    scene = {
+        "bearing": {**row, **grooves, "dynamic_capacity_N": CAPACITY},
+        "operation": load,
+        "materials": {"ball": steel, "rings": steel},
+    }
+    found = equilibrium(BallScene.from_dict(scene))
+    assert 1e3 * found.displacement_mm["x"] == pytest.approx(x, rel=1e-4, abs=1e-9)
+    assert found.life.L10_Mrev == pytest.approx(million, rel=1e-4)
+
+
 def test_closed_form_axial_load_and_clearance():
     """Closed form: under an axial load alone every ball bears F_a/(Z sin alpha); with cos(alpha) = A cos(alpha_0)/(A + delta)."""
     row = reported_row(10e-6)
@@ -149,6 +166,19 @@ def test_literature_catalogue_of_a_6206():
     static = life.static_capacity(9, 0.0, static_races(9.525e-3, 9.525 / 46.0))
     assert capacity == pytest.approx(19.5e3, rel=0.02)
     assert static == pytest.approx(11.25e3, rel=0.02)
+
+
+@pytest.mark.parametrize(
+    ("balls", "ball", "pitch", "catalogue"),
+    [(9, 7.938, 39.0, 14.0), (9, 9.525, 46.0, 19.5), (9, 11.906, 60.0, 29.1), (8, 15.081, 65.0, 40.5)],
+)
+@pytest.mark.parametrize("grooves", [(0.515, 0.525), (0.52, 0.53)])
+def test_literature_catalogue_of_four_bearings(balls, ball, pitch, catalogue, grooves):
+    """Literature: C [kN] of a 6205, 6206, 6208 and 6308; ISO 281 has one f_c for all grooves up to 0.52 inside and 0.53 outside."""
+    rated = life.rated_capacity(balls, 1e-3 * ball, 1e-3 * pitch, 0.0, *grooves)
+    assert 1e-3 * rated == pytest.approx(catalogue, rel=0.007)
+    wide = life.rated_capacity(balls, 1e-3 * ball, 1e-3 * pitch, 0.0, 0.53, 0.54)
+    assert wide < rated
 
 
 def test_capacity_scales_with_balls_rows_and_size():

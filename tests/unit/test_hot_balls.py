@@ -110,7 +110,7 @@ def test_example_preload_grows_with_the_heat():
     assert [warm.temperatures_C[node] for node in NODES] == pytest.approx([52.4, 61.3, 75.6, 76.6], abs=0.1)
     cold = rbdyn.equilibrium(Scene.from_dict(tables))
     assert cold.reaction.load_N["z"] == pytest.approx(1872.0, rel=2e-3)
-    assert [cold.life.L10_h, warm.life.L10_h] == pytest.approx([58.6e3, 15.0e3], rel=0.01)
+    assert [cold.life.L10_h, warm.life.L10_h] == pytest.approx([64.6e3, 16.5e3], rel=0.01)
 
 
 def test_unit_gain_is_that_of_the_iteration():
