@@ -124,7 +124,7 @@ def edge_angles(solution: Solution, rating: Rating, race: Race) -> Array:
     loads = loads_on(solution, race)
     angles = solution.inner_angle if race == "inner" else solution.outer_angle
     share = rating.contact(race).semi_major / rating.groove(race) * np.cbrt(np.maximum(loads, 0.0))
-    size = angles if rating.drawing.contact_angle > 0.0 else np.abs(angles)
+    size = np.abs(angles) if rating.drawing.both_ways else angles
     return np.where(carrying(loads) & (size >= 0.0), size + np.arcsin(np.minimum(share, 1.0)), -np.inf)
 
 
@@ -180,8 +180,8 @@ def remarks(solution: Solution, rating: Rating, name: str = "") -> list[Remark]:
         ("no-shoulder", "steep angle", steep,
             f"inner angles reach {steepest:.0f} deg, beyond any shoulder: rotation pushes the inner ring off its balls; "
             "raise its axial preload or reduce the speed"),
-        ("no-shoulder", "negative angle", rating.drawing.contact_angle > 0.0 and turned > 0 and not steep,
-            f"{turned} balls carry load at negative angles, where an angular contact bearing has no shoulder; reverse the "
+        ("no-shoulder", "negative angle", turned > 0 and not rating.drawing.both_ways and not steep,
+            f"{turned} of {size} balls carry load at negative angles, where an angular contact bearing has no shoulder; reverse the "
             "thrust or pair the bearing"),
         ("gyroscopic-slip", "gyroscopic slip", needed > OILED_FRICTION,
             f"the gyroscopic moment needs a friction coefficient of {needed:.2f}, more than oil gives: the balls slip "

@@ -162,6 +162,11 @@ class BallRow(Consistent):
         return self.contact_angle
 
     @property
+    def both_ways(self) -> bool:
+        """Whether rings have shoulders on both sides, so that balls also carry at negative angles."""
+        return self.contact_angle == 0.0
+
+    @property
     def gamma(self) -> float:
         """Ball over pitch diameter, in the plane of the unloaded contacts: D cos a_0/d_m."""
         return self.ball_diameter_mm * math.cos(self.contact_angle) / self.pitch_diameter_mm
@@ -189,6 +194,11 @@ class BallBearing(BallRow):
     def rated_angle(self) -> float:
         """Nominal contact angle of load ratings [rad]: 0 of a deep groove bearing (ISO 281), whatever its clearance."""
         return 0.0 if self.kind == "deep_groove_ball" else self.contact_angle
+
+    @property
+    def both_ways(self) -> bool:
+        """Whether rings have shoulders on both sides, as those of a deep groove bearing."""
+        return self.kind == "deep_groove_ball" or super().both_ways
 
 
 class MiddleRing(Strict):

@@ -97,6 +97,19 @@ def test_a_sweep_names_the_points_that_climb() -> None:
     assert notes["inner shoulder"] == [2, 3]
 
 
+def test_a_deep_groove_has_a_shoulder_on_either_side():
+    """Invariant: thrusts from both sides load the grooves alike; a bearing with one shoulder has none for the second."""
+    deep = {"kind": "deep_groove_ball", "contact_angle_deg": None, "radial_clearance_mm": 0.02}
+    for force in (2000.0, 60_000.0):
+        push, pull = (equilibrium(thrust(side * force, **deep)) for side in (1.0, -1.0))
+        assert [note.code for note in pull.notes] == [note.code for note in push.notes]
+        for race, contact in push.contacts.items():
+            assert pull.contacts[race].edge_angle_deg == pytest.approx(contact.edge_angle_deg, abs=1e-6)
+    assert {note.code for note in push.notes} == {"shoulder"}
+    one_sided = equilibrium(thrust(-2000.0)).notes
+    assert any("14 of 14 balls carry load at negative angles" in note for note in one_sided)
+
+
 def test_idle_balls_neither_climb_nor_slip():
     """Unit: at 10 rpm the balls without load carry 1e-7 of the largest, by their centrifugal force: a note counts them, and none warns."""
     scene = Scene.from_dict(
