@@ -70,7 +70,7 @@ def scene_text(words: str, options: Options) -> str:
     source = f"{sizes}: estimated inside" if sizes and not is_own else OWN if is_own else f"DESIGNATION {subject.name}"
     try:
         scene = Scene.from_dict(tomllib.loads(text), source)
-        notes = [*getattr(scene, "unit_notes", ())]
+        notes = [*scene.unit_notes]
         if scene.thermal and scene.lubricant and scene.mounting and scene.mounting.width:
             notes += heat_notes(scene.thermal, scene.lubricant, scene.mounting, scene.mounting.width)
         refuse(f"{source}: {note}" for note in notes)

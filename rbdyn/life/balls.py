@@ -86,9 +86,9 @@ def rated_capacity(
 ) -> float:
     """C_r [N] as ISO 281 rates a row: grooves up to ``WIDEST_RATED`` by the standard's table, wider ones lower as in its theory."""
     sizes = balls, ball_diameter, pitch_diameter, contact_angle
-    grooves = map(max, (inner_groove_factor, outer_groove_factor), WIDEST_RATED)
+    inner, outer = max(inner_groove_factor, WIDEST_RATED[0]), max(outer_groove_factor, WIDEST_RATED[1])
     tabled = dynamic_capacity(*sizes, RATED_GROOVE, RATED_GROOVE)
-    return tabled * dynamic_capacity(*sizes, *grooves) / dynamic_capacity(*sizes, *WIDEST_RATED)
+    return tabled * dynamic_capacity(*sizes, inner, outer) / dynamic_capacity(*sizes, *WIDEST_RATED)
 
 
 def static_capacity(balls: int, contact_angle: float, races: tuple[PointContact, PointContact]) -> float:

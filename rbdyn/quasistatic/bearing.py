@@ -105,7 +105,11 @@ def _single_row(scene: SingleRowScene, warm: Solution | None) -> BallResult:
     films = films_of(scene, rating, solution, ("inner_ring", "outer_ring"))
     report = row_report(rating, solution, films, RingLoad.of(solution.reaction))
     grown = growth_record(scene, {"inner_less_outer_race": row_change(scene)})
-    notes = [*_limit_notes(scene, model), *(() if scene.lubricant is None else scene.lubricant.estimates)]
+    notes = [
+        *scene.unit_notes,
+        *_limit_notes(scene, model),
+        *(() if scene.lubricant is None else scene.lubricant.estimates),
+    ]
     notes += [remark.note for remark in (*remarks(solution, rating), *tipping(solution.displacement, scene))]
     others = _other_roots(scene, model, solution)
     if others:
@@ -176,7 +180,7 @@ def _double_decker(scene: DoubleDeckerScene, starts: tuple[Solution, ...]) -> Ba
         Rating(above, model.outer, reference_capacities(above), (middle, operation.outer_speed)),
     )
     layers: dict[str, RowReport] = {}
-    notes = [] if scene.lubricant is None else list(scene.lubricant.estimates)
+    notes = [*scene.unit_notes, *(() if scene.lubricant is None else scene.lubricant.estimates)]
     for name, rating, row in zip(rings, ratings, rows, strict=True):
         if why := overload(row, rating):
             return replace(base, status=f"{name} row {why}")

@@ -5,7 +5,7 @@ scene into the SI parameters of the kernels. ``Scene``, a roller bearing, is in 
 
 - ``bearing``: drawing of bearing and cage, materials; ``operation``: speeds, loads, support, mounting
 - ``lubricant``: oil and traction; ``laws``: laws of the interactions, and numerics
-- ``ball``: scene of a ball bearing; ``reading``: scenes from files and tables
+- ``ball``, ``form_errors``: scene of a ball bearing; ``reading``: scenes from files and tables
 - ``thermal``: heat balance and warming of a cold machine; ``input_ranges``: what the unknown inputs of the balance leave open
 - ``geometry``: radii, masses and speeds; ``fits``: rings, clearances and grooves as mounted; ``notes``: suspicious values
 - ``uncertain``: declared unknown inputs; ``unknown``: the unknown inputs of a scene; ``keys``: descriptions of all keys,

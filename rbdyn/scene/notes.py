@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterable, Iterator, Mapping
+from typing import Protocol
 
 from rbdyn.base.faults import RPM
 from rbdyn.base.notes import Note, Notes
@@ -26,6 +27,7 @@ FACTORS = {
     "1_GPa": {"1/Pa": 1e9, "1/MPa": 1e3},
     "N_m": {"N/um": 1e6, "N/mm": 1e3},
     "l_min": {"mL/min": 1e-3},
+    "deg": {"rad": 180.0 / math.pi},
 }
 ZERO_C_K = 273.15
 # Usual temperatures. Ester oils endure about 200 C and stiffen towards -54 C; bearing steels lose hardness above 300 C.
@@ -39,9 +41,19 @@ AMBIENT_C = (-60.0, 210.0)
 LARGEST_FLOW = 300.0 / 12_500.0
 # Usual pressure coefficient [1/GPa]: below 1 for water, 60 for the thickest mineral oils in the cold.
 PRESSURE_COEFFICIENT = (2.0, 80.0)
+# Usual contact angles [deg]: from 12 to 60 on drawings, with room to both sides; one in radians is at most 1.3.
+CONTACT_ANGLE = (2.0, 75.0)
 # Stiffness of a bar over modulus times roller length: 0.005 for slender bars, 0.3 for stubby ones, by the finite elements of
 # tests/oracle/test_cage_bar.py; a factor of forty to each side allows for another material.
 BAR_STIFFNESS = (1e-4, 20.0)
+
+
+class DrawnRow(Protocol):
+    """Sizes of a row of balls that may be in another unit."""
+
+    contact_angle_deg: float | None
+    radial_clearance_mm: float | None
+    pitch_diameter_mm: float
 
 
 def unit_notes(
@@ -58,22 +70,39 @@ def unit_notes(
     or "rigid".
     """
     usual = [*_of_cage(bearing, cage, cage_material, bar_stiffness), *_of_section(bearing, cage)]
-    # The least clearances are below any tolerance grade, the largest several times the loosest class.
-    usual += [
-        (
-            "bearing.radial_clearance_mm",
-            max(bearing.radial_clearance_mm, 0.0) or None,
-            (5e-4, 5e-3 * bearing.pitch_diameter_mm),
-        ),
+    usual.append(_of_clearance("bearing", bearing.radial_clearance_mm, bearing.pitch_diameter_mm))
+    return _notes([*usual, *_of_oil(oil), *_of_mounting(mounting)])
+
+
+def ball_unit_notes(rows: Mapping[str, DrawnRow], oil: Lubricant | None, mounting: Mounting | None) -> Notes:
+    """One sentence for each suspicious value of a ball bearing; ``rows`` by the name of their table."""
+    usual = list[Usual]()
+    for table, row in rows.items():
+        usual.append((f"{table}.contact_angle_deg", row.contact_angle_deg or None, CONTACT_ANGLE))
+        usual.append(_of_clearance(table, row.radial_clearance_mm or 0.0, row.pitch_diameter_mm))
+    return _notes([*usual, *([] if oil is None else _of_oil(oil)), *_of_mounting(mounting)])
+
+
+def _of_clearance(table: str, clearance_mm: float, pitch_mm: float) -> Usual:
+    """A diametral clearance: the least is below any tolerance grade, the largest several times the loosest class."""
+    return f"{table}.radial_clearance_mm", max(clearance_mm, 0.0) or None, (5e-4, 5e-3 * pitch_mm)
+
+
+def _of_oil(oil: Lubricant) -> list[Usual]:
+    """Values of the lubricant, with their usual ranges."""
+    return [
         ("lubricant.roller_roughness_um", oil.roller_roughness_um, (3e-3, 5.0)),
         ("lubricant.race_roughness_um", oil.race_roughness_um, (3e-3, 5.0)),
         ("lubricant.viscosity_mPas", oil.viscosity_mPas, (0.3, 1e5)),
         ("lubricant.pressure_coefficient_1_GPa", oil.pressure_coefficient_1_GPa, PRESSURE_COEFFICIENT),
         ("lubricant.temperature_C", oil.temperature_C, OIL_C),
     ]
+
+
+def _of_mounting(mounting: Mounting | None) -> list[Usual]:
+    """Temperatures of parts, with their usual range."""
     temperatures = {} if mounting is None else mounting.model_dump()
-    usual += [(f"mounting.{key}", value, RING_C) for key, value in temperatures.items() if key.endswith("_C")]
-    return _notes(usual)
+    return [(f"mounting.{key}", value, RING_C) for key, value in temperatures.items() if key.endswith("_C")]
 
 
 def heat_notes(thermal: Thermal, oil: Lubricant, mounting: Mounting, width: float) -> Notes:

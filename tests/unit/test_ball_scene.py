@@ -315,3 +315,24 @@ def test_unit_balls_without_a_load_touch_nothing():
     """Unit: loads left over from rounding are no contact; the result says that nothing tells where the ring is."""
     idle = BallScene.load(EXAMPLES / "angular_contact_ball.toml", UNLOADED)
     assert any("no ball touches the inner raceway" in note for note in equilibrium(idle).notes)
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"bearing.contact_angle_deg": 0.698}, "bearing.contact_angle_deg = 0.698: is outside the usual 2 to 75; if 0.698 rad are meant, write 39.99"),
+        ({"lubricant.temperature_C": 343.15}, "lubricant.temperature_C = 343.15: is outside the usual -60 to 220; if 343.15 K are meant, write 70"),
+        ({"bearing.contact_angle_deg": None, "bearing.radial_clearance_mm": 0.9}, "bearing.radial_clearance_mm = 0.9: is outside the usual"),
+    ],
+)  # fmt: skip
+def test_unit_a_probable_slip_of_the_unit_is_a_note(changes, words):
+    """Unit: values of a ball bearing that look like another unit, with the probable one; usual values have no note."""
+    row = {"kind": "angular_contact_ball", "balls": 13, "ball_diameter_mm": 12.7, "pitch_diameter_mm": 60.0}
+    grooves = {"inner_groove_factor": 0.52, "outer_groove_factor": 0.53, "contact_angle_deg": 40.0}
+    oil = {"oil": "ISO VG 68", "temperature_C": 70.0}
+    usual = BallScene.from_dict(
+        {"bearing": {**row, **grooves}, "operation": {"axial_load_N": 3000.0}, "lubricant": oil}
+    )
+    assert usual.unit_notes == ()
+    notes = equilibrium(usual.changed(changes)).notes
+    assert any(note.code == "unit" and note.startswith(words) for note in notes)

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from rbdyn.base.faults import InputError, validated
 from rbdyn.quasistatic.runout.lots import errors_of
 from rbdyn.quasistatic.runout.turn import ball_path, perfect, random_waviness, rolling, waviness
-from rbdyn.scene.ball import FormErrors, misfits
+from rbdyn.scene.form_errors import FormErrors, misfits
 
 Z = 7
 TURNING = rolling(12.7e-3, 70e-3, math.radians(40.0))

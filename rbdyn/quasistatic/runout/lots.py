@@ -30,8 +30,9 @@ from rbdyn.quasistatic.row.model import constraint_of, load_of, row_of
 from rbdyn.quasistatic.row.ring import Row
 from rbdyn.quasistatic.runout import turn
 from rbdyn.quasistatic.runout.turn import PERFECT, RaceErrors, RingPath, Turning, Waviness, ball_path, follow, waviness
-from rbdyn.scene.ball import GROOVES, BallScene, FormErrors, RandomWaviness, SingleRowScene
+from rbdyn.scene.ball import BallScene, SingleRowScene
 from rbdyn.scene.bearing import Harmonic
+from rbdyn.scene.form_errors import GROOVES, FormErrors, RandomWaviness
 
 # Error of one ball in the differences [m]: far below any deflection, far above the solver's rounding.
 SMALL_ERROR = 1e-8
