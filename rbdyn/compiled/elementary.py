@@ -58,27 +58,6 @@ def _fused(typing_context: Any, a: Any, b: Any, c: Any) -> Any:
     return types.float64(types.float64, types.float64, types.float64), generate
 
 
-@intrinsic
-def _reordered(typing_context: Any, a: Any, b: Any) -> Any:
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        return builder.fadd(*arguments, flags=("reassoc",))
-
-    return types.float64(types.float64, types.float64), generate
-
-
-def reordered_sum(a: float, b: float) -> float:
-    """a + b, in a running sum whose order the compiler may choose.
-
-    For loops that only read: nothing is then decided at run time, so equal inputs still give equal bits.
-    """
-    return a + b
-
-
-@compiled_as(reordered_sum)
-def _(a, b):
-    return _reordered(a, b)
-
-
 def fma(a: float, b: float, c: float) -> float:
     """a b + c, rounded once where compiled: asked for by name, it is the same in scalar and in vector code."""
     return a * b + c

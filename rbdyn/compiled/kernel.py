@@ -126,7 +126,6 @@ WAY = "parts" if OWN_COMPILER else "stock"
 OPTIONS: dict[str, Any] = {"error_model": "numpy"}
 # Calls of compiled code return tuples through memory and carry an error status: small functions must vanish.
 INLINED: dict[str, Any] = {**OPTIONS, **(OWN_COMPILER.INLINED if OWN_COMPILER else {"forceinline": True})}
-SETTLED: dict[str, Any] = {**OPTIONS, **(OWN_COMPILER.SETTLED if OWN_COMPILER else {"forceinline": True})}
 ROUTINE: dict[str, Any] = {**OPTIONS, **(OWN_COMPILER.ROUTINE if OWN_COMPILER else {"forceinline": False})}
 ENTRY: dict[str, Any] = {**OPTIONS, **(OWN_COMPILER.ENTRY if OWN_COMPILER else {}), "nogil": True}
 
@@ -140,11 +139,6 @@ def _inner(function: Callable[..., Any], options: dict[str, Any]) -> Any:
 def kernel(function: Callable[..., Any]) -> Any:
     """Compile a small pure function into its callers; ``.py_func`` is the interpreted one."""
     return _inner(function, INLINED)
-
-
-def settled_kernel(function: Callable[..., Any]) -> Any:
-    """``kernel`` with a ``reordered_sum``, whose order is settled here, the same for all callers."""
-    return _inner(function, SETTLED)
 
 
 def routine(function: Callable[..., Any]) -> Any:

@@ -70,15 +70,6 @@ class Part(JITCodeLibrary):
         self._finalized = True
 
 
-class SettledPart(Part):
-    """A part that is optimised before it is linked into its callers."""
-
-    def finalize(self) -> None:
-        """Settle the order of sums that the compiler may choose, for all callers."""
-        super().finalize()
-        self._optimize_final_module()
-
-
 def _holds_array(form: Any) -> bool:
     return isinstance(form, types.Array) or any(map(_holds_array, getattr(form, "types", ())))
 
@@ -86,8 +77,6 @@ def _holds_array(form: Any) -> bool:
 @register_pass(mutates_CFG=True, analysis_only=False)
 class PartLowering(NativeLowering):
     """Lowering to a ``Part``."""
-
-    library: type[Part] = Part
 
     def __init__(self) -> None:
         super().__init__()
@@ -98,7 +87,7 @@ class PartLowering(NativeLowering):
         if not any(map(_holds_array, (state.return_type, *calls))):
             # The function creates and returns no array: its caller owns all of them, so references need no count.
             state.targetctx = state.targetctx.subtarget(enable_nrt=False)
-        state.library = self.library(state.targetctx.codegen(), state.func_id.func_qualname)
+        state.library = Part(state.targetctx.codegen(), state.func_id.func_qualname)
         super().run_pass(state)
         code = state["cr"]
         handle = _dynfunc.make_function(code.fndesc.lookup_module(), code.fndesc.qualname, "", 0, code.env, ())
@@ -106,13 +95,6 @@ class PartLowering(NativeLowering):
         state.reload_init.extend(state.library._reload_init)
         state["cr"] = code._replace(cfunc=handle)
         return True
-
-
-@register_pass(mutates_CFG=True, analysis_only=False)
-class SettledLowering(PartLowering):
-    """Lowering to a ``SettledPart``."""
-
-    library = SettledPart
 
 
 class Whole:
@@ -231,17 +213,10 @@ class PartCompiler(KernelCompiler):
         super().__init__(*arguments[:5], PartFlags.of(arguments[5]), *arguments[6:])
 
 
-class SettledCompiler(PartCompiler):
-    """Compiler of a ``SettledPart``."""
-
-    lowering = SettledLowering
-
-
 # Options of each kind of function; a missing option would be that of its first caller.
 WRAPPERS = ("no_cpython_wrapper", "no_cfunc_wrapper")
 ROUTINE: dict[str, Any] = {**dict.fromkeys(WRAPPERS, True), "pipeline_class": PartCompiler, "forceinline": False}
 INLINED: dict[str, Any] = {**ROUTINE, "forceinline": True}
-SETTLED: dict[str, Any] = {**INLINED, "pipeline_class": SettledCompiler}
 ENTRY: dict[str, Any] = {"no_cfunc_wrapper": True, "pipeline_class": KernelCompiler}
 
 
@@ -318,7 +293,7 @@ def self_test() -> None:
     def compiled(options: dict[str, Any], kind: Any = Inner) -> Callable[[Any], Any]:
         return lambda function: kind.of(make(error_model="numpy", **options)(function))
 
-    @compiled(SETTLED)
+    @compiled(INLINED)
     def row_sum(row):
         total = 0.0
         for i in range(len(row)):

@@ -13,10 +13,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rbdyn.base.arrays import Array
+from rbdyn.base.arrays import Array, Whole
 from rbdyn.base.notes import Note, Notes
-from rbdyn.compiled.elementary import eighteenth_root, fast_exp, fast_log, fma, reordered_sum, rough_power
-from rbdyn.compiled.kernel import VECTOR, kernel, law, law_of, settled_kernel
+from rbdyn.compiled.elementary import eighteenth_root, fast_exp, fast_log, fma, rough_power
+from rbdyn.compiled.kernel import VECTOR, kernel, law, law_of
 
 BALLS, ROLLERS = 4200e6, 4000e6  # [Pa]
 SHEAR_YIELD = 6900e6 / 3.0 / math.sqrt(3.0)  # k [Pa]
@@ -73,11 +73,15 @@ class LogarithmicLineContact(NamedTuple):
 
 
 class SlicedLineContact(NamedTuple):
-    """Equal slices, each relieved by the roller's profile: Q = sum_k Q_whole(delta - P_k)/m."""
+    """Equal slices, each relieved by the roller's profile: Q = sum_k Q_whole(delta - P_k)/m.
+
+    Slices of one drop count as one. They stand by rising drop, so that those that carry load come first.
+    """
 
     line: Any
     relief: Array  # profile drop at the slice centres [m], padded to whole vectors
-    share: Array  # 1/m; 0 in the padding
+    share: Array  # of the m slices; 0 in the padding
+    place: Whole  # of each slice along the roller, (m,)
 
 
 class TiltedLineContact(NamedTuple):
@@ -86,9 +90,28 @@ class TiltedLineContact(NamedTuple):
     line: Any
     relief: Array  # [m]
     share: Array
+    place: Whole
     rise: Array  # x_k theta [m]
+    largest_rise: float  # [m]
     direction_x: float  # cos and sin of psi_0, where the tilt is largest
     direction_y: float
+
+
+class Slice(NamedTuple):
+    """One slice: profile drop [m], share of the length, additional overlap where the tilt is largest [m]."""
+
+    drop: float
+    share: float
+    rise: float
+
+
+class SummedLoad(NamedTuple):
+    """A sliced contact whose slices have been summed: what ``line_load`` gives."""
+
+    load: float  # [N]
+    stiffness: float  # [N/m]
+    approach: float  # [m]
+    lean: float  # [m/rad]
 
 
 class LineContactOnBar(NamedTuple):
@@ -138,13 +161,23 @@ def slice_contact(
 
     Empty slices fill them up to whole vectors.
     """
-    padding = -len(relief) % VECTOR
-    drop = np.concatenate((relief, np.zeros(padding)))
-    share = np.concatenate((np.full(len(relief), 1.0 / len(relief)), np.zeros(padding)))
+    slices = np.column_stack((relief, position * tilt + 0.0))
+    # Rows by rising drop; between parallel rings both halves of a roller are one.
+    (drops, rises), place, count = _unequal_rows(slices)
+    padding = 0, -len(drops) % VECTOR
+    drop, share = np.pad(drops, padding, "edge"), np.pad(count / len(relief), padding)
     if tilt == 0.0:
-        return SlicedLineContact(line, drop, share)
-    rise = np.concatenate((position * tilt, np.zeros(padding)))
-    return TiltedLineContact(line, drop, share, rise, math.cos(direction), math.sin(direction))
+        return SlicedLineContact(line, drop, share, place)
+    rise = np.pad(rises, padding)
+    return TiltedLineContact(
+        line, drop, share, place, rise, float(abs(rise).max()), math.cos(direction), math.sin(direction)
+    )
+
+
+def _unequal_rows(rows: Array) -> tuple[Array, Whole, Whole]:
+    """Columns of the unequal rows, by rising values; place among these of each row; how many rows each stands for."""
+    unequal, place, count = np.unique(rows, axis=0, return_inverse=True, return_counts=True)
+    return unequal.T, place.ravel(), count
 
 
 @law_of(LineContact)
@@ -199,7 +232,7 @@ def _(contact, approach):
     return contact.stiffness * (y4 * y4 * y2), in_series
 
 
-@law_of(PowerLineContact, LogarithmicLineContact, LineContactOnBar, SlicedLineContact, TiltedLineContact)
+@law_of(PowerLineContact, LogarithmicLineContact, LineContactOnBar, SlicedLineContact, TiltedLineContact, SummedLoad)
 def root_stiffness(contact, stiffness, approach):
     """Square root of the tangent stiffness [sqrt(N/m)] that a contact has at an approach [m]."""
     return math.sqrt(stiffness)
@@ -236,54 +269,107 @@ def _(contact, overlap, nx, ny):
 
 
 @law_of(SlicedLineContact)
-def slice_drop(contact, k, nx, ny):
-    """Overlap of slice ``k`` less than that of the roller's middle [m]."""
-    return contact.relief[k]
+def slice_of(contact, k):
+    """``Slice`` number ``k``, by rising drop."""
+    return Slice(contact.relief[k], contact.share[k], 0.0)
 
 
-@slice_drop.body(TiltedLineContact)
-def _(contact, k, nx, ny):
-    return contact.relief[k] - (nx * contact.direction_x + ny * contact.direction_y) * contact.rise[k]
+@slice_of.body(TiltedLineContact)
+def _(contact, k):
+    return Slice(contact.relief[k], contact.share[k], contact.rise[k])
 
 
 @law_of(SlicedLineContact)
-def slice_rise(contact, k):
-    """Additional overlap of slice ``k`` where the tilt is largest [m]."""
+def slice_drop(contact, lamina, nx, ny):
+    """Overlap of a ``Slice`` less than that of the roller's middle [m]."""
+    return lamina.drop
+
+
+@slice_drop.body(TiltedLineContact)
+def _(contact, lamina, nx, ny):
+    return lamina.drop - (nx * contact.direction_x + ny * contact.direction_y) * lamina.rise
+
+
+@law_of(SlicedLineContact)
+def largest_rise(contact):
+    """Largest additional overlap of a slice [m]."""
     return 0.0
 
 
-@slice_rise.body(TiltedLineContact)
-def _(contact, k):
-    return contact.rise[k]
+@largest_rise.body(TiltedLineContact)
+def _(contact):
+    return contact.largest_rise
 
 
-@settled_kernel
-def sum_of_slices(contact, overlap, nx, ny):
-    """Load, stiffness, mean approach weighted by stiffness and mean rise weighted by load, of a sliced roller."""
+@kernel
+def loaded_slices(contact, overlap):
+    """Number of the first slices, in whole vectors, beyond which none carries load; all for NaN."""
+    count, reach = 0, overlap + largest_rise(contact)
+    while count < contact.share.size and not contact.relief[count] >= reach:
+        count += VECTOR
+    return count
+
+
+@law_of(SlicedLineContact)
+def lean(contact, rise, nx, ny):
+    """Change of the overlap with the azimuth [m/rad] of a roller whose slices rise so much on average [m]."""
+    return 0.0
+
+
+@lean.body(TiltedLineContact)
+def _(contact, rise, nx, ny):
+    return rise * (nx * contact.direction_y - ny * contact.direction_x)
+
+
+@kernel
+def slice_terms(contact, lamina, overlap, nx, ny):
+    """Load and stiffness of a ``Slice``, that times the approach, and the load times the rise."""
+    own_overlap = overlap - slice_drop(contact, lamina, nx, ny)
+    own_load, own_stiffness, approach = closed_load(contact.line, own_overlap)
+    load = lamina.share * own_load
+    stiffness = 0.0 if own_overlap <= 0.0 else lamina.share * own_stiffness
+    return load, stiffness, stiffness * approach, load * lamina.rise
+
+
+@kernel
+def summed_load(contact, load, stiffness, weighted, raised, nx, ny):
+    """``SummedLoad`` of the sums of ``slice_terms``: mean approach weighted by stiffness, mean rise by load."""
+    none = load <= 0.0
+    return SummedLoad(
+        load,
+        0.0 if none else stiffness,
+        SMALLEST_APPROACH if none else weighted / stiffness,
+        0.0 if none else lean(contact, raised / load, nx, ny),
+    )
+
+
+@line_load.body(SlicedLineContact, TiltedLineContact)
+def _(contact, overlap, nx, ny):
     load = stiffness = weighted = raised = 0.0
-    for k in range(contact.share.size):
-        own_overlap = overlap - slice_drop(contact, k, nx, ny)
-        own_load, own_stiffness, approach = closed_load(contact.line, own_overlap)
-        own_stiffness = 0.0 if own_overlap <= 0.0 else contact.share[k] * own_stiffness
-        load = reordered_sum(load, contact.share[k] * own_load)
-        stiffness = reordered_sum(stiffness, own_stiffness)
-        weighted = reordered_sum(weighted, own_stiffness * approach)
-        raised = reordered_sum(raised, contact.share[k] * own_load * slice_rise(contact, k))
-    if load <= 0.0:
-        return load, 0.0, SMALLEST_APPROACH, 0.0
-    return load, stiffness, weighted / stiffness, raised / load
+    for k in range(loaded_slices(contact, overlap)):
+        terms = slice_terms(contact, slice_of(contact, k), overlap, nx, ny)
+        load += terms[0]
+        stiffness += terms[1]
+        weighted += terms[2]
+        raised += terms[3]
+    total = summed_load(contact, load, stiffness, weighted, raised, nx, ny)
+    return total.load, total.stiffness, total.approach, total.lean
 
 
-@line_load.body(SlicedLineContact)
+@line_load.body(SummedLoad)
 def _(contact, overlap, nx, ny):
-    load, stiffness, approach, _ = sum_of_slices(contact, overlap, nx, ny)
-    return load, stiffness, approach, 0.0
+    return contact.load, contact.stiffness, contact.approach, contact.lean
 
 
-@line_load.body(TiltedLineContact)
-def _(contact, overlap, nx, ny):
-    load, stiffness, approach, rise = sum_of_slices(contact, overlap, nx, ny)
-    return load, stiffness, approach, rise * (nx * contact.direction_y - ny * contact.direction_x)
+@law_of(LineContact, PowerLineContact, LogarithmicLineContact)
+def without_slices(contact):
+    """The law as lanes read it, numbers alone."""
+    return contact
+
+
+@without_slices.body(SlicedLineContact, TiltedLineContact)
+def _(contact):
+    return SummedLoad(0.0, 0.0, SMALLEST_APPROACH, 0.0)
 
 
 @law_of(LineContact, PowerLineContact, LogarithmicLineContact, SlicedLineContact)
@@ -292,7 +378,7 @@ def around(contact, slope, size):
     return 0.0
 
 
-@around.body(TiltedLineContact)
+@around.body(TiltedLineContact, SummedLoad)
 def _(contact, slope, size):
     return slope * size
 
@@ -342,8 +428,10 @@ def _(contact, overlap, nx, ny):
 def energy_of_slices(contact, overlap, nx, ny):
     """``line_energy`` of a sliced roller."""
     energy = 0.0
-    for k in range(contact.share.size):
-        energy += contact.share[k] * closed_energy(contact.line, overlap - slice_drop(contact, k, nx, ny))
+    for k in range(loaded_slices(contact, overlap)):
+        energy += contact.share[k] * closed_energy(
+            contact.line, overlap - slice_drop(contact, slice_of(contact, k), nx, ny)
+        )
     return energy
 
 

@@ -13,7 +13,8 @@ from rbdyn.base.arrays import Array
 
 def slice_centres(slices: int, length: float) -> Array:
     """Axial positions of the slice centres from the roller's middle [m] (Chen et al. 2022, eq 2)."""
-    return (-0.5 + (np.arange(1, slices + 1) - 0.5) / slices) * length
+    # Whole numbers first: both halves are then equal to the last bit.
+    return np.asarray((2.0 * np.arange(1, slices + 1) - 1.0 - slices) / (2.0 * slices) * length)
 
 
 def logarithmic_relief(position: Array, diameter: float, length: float) -> Array:

@@ -31,7 +31,7 @@ from prose import (
 LONGEST_FILE, LONGEST_FUNCTION, MOST_AT_THE_ROOT = 600, 70, 6
 # Lines of code of both packages. A change may lower this freely. Raise it only with the feature that needs it, and say by
 # how much in the commit.
-MOST_CODE = 48_588
+MOST_CODE = 48_691
 TOP = {
     ".ci",
     ".gitignore",
@@ -47,7 +47,7 @@ TOP = {
     "tests",
 }
 NOT_SI = re.compile(r"_(mm|mm2|um|mm_um|g|g_mm|rpm|deg|mrad|MPa|GPa)$")
-KERNEL = re.compile(r"kernel|routine|settled_kernel|entry|law_of\(|.*\.body\(|compiled_as\(")
+KERNEL = re.compile(r"kernel|routine|entry|law_of\(|.*\.body\(|compiled_as\(")
 # Where a drawing's own units may be read: what speaks to people, what makes scenes of scenes, and saved records.
 EDGES = {
     "rbdyn/scene/": "where they leave as SI",

@@ -22,7 +22,7 @@ import rbdyn.contact
 import rbdyn.dynamics
 from rbdyn.accuracy.variants import OPTIONS, with_options
 from rbdyn.contact.cage_film import journal_film_force, wall_film
-from rbdyn.contact.hertz_line import sum_of_slices
+from rbdyn.contact.hertz_line import loaded_slices, slice_terms
 from rbdyn.contact.rolling_resistance import film_forces
 from rbdyn.contact.traction import asperity_load_share, cubic
 from rbdyn.dynamics.ensemble import Stop
@@ -82,7 +82,7 @@ LAWS = {
 }
 # Kernels that only these options call.
 KERNELS_OF_OPTIONS = (
-    sum_of_slices, turned_multiple, cubic, asperity_load_share, film_forces, open_contact, wall_film, film_on_wall,
+    loaded_slices, slice_terms, turned_multiple, cubic, asperity_load_share, film_forces, open_contact, wall_film, film_on_wall,
     segment,
 )  # fmt: skip
 # Numbers that an option adds to the state: a ring's place and velocity, or time and two angles, or two coefficients a roller.

@@ -15,8 +15,9 @@ from rbdyn.contact.hertz_line import LineContact, slice_contact
 from rbdyn.contact.traction import TractionSurface
 from rbdyn.dynamics.forces.bodies import RingMotion
 from rbdyn.dynamics.forces.cage import NoPocket, pocket_contact, pocket_gap
-from rbdyn.dynamics.forces.race_lanes import OnRing, open_contact, scratch, share_vectors, with_open_films
-from rbdyn.dynamics.forces.races import RoundRace, roller_radius
+from rbdyn.dynamics.forces.equations import motions
+from rbdyn.dynamics.forces.race_lanes import OnRing, open_contact, race_forces, scratch, share_vectors, with_open_films
+from rbdyn.dynamics.forces.races import RoundRace, race_observed, roller_radius
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.scene import Scene
 
@@ -49,6 +50,20 @@ def compiled_film(bearing, ring, y, j):
     dx, dy, dvx, dvy = y[j] - ring.x, y[z + j] - ring.y, y[2 * z + j] - ring.vx, y[3 * z + j] - ring.vy
     radius = roller_radius(bearing.sizes, j)
     return open_contact(bearing.open_film, bearing.inner, radius, ring, dx, dy, dvx, dvy, y[4 * z + j])
+
+
+@njit
+def compiled_races(bearing, y, dy, space):
+    _, _, inner, outer = motions(bearing, y)
+    race_forces(bearing.outer, bearing.inner, bearing.sizes, outer, inner, bearing.rollers, y, 0, dy, space)
+
+
+@njit
+def compiled_contacts(bearing, y, j):
+    _, _, inner, outer = motions(bearing, y)
+    one = race_observed(bearing.outer, 1.0, bearing, y, j, outer)
+    other = race_observed(bearing.inner, -1.0, bearing, y, j, inner)
+    return one.x + other.x, one.y + other.y, one.roller_moment + other.roller_moment, one.load, other.load
 
 
 @njit
@@ -88,6 +103,38 @@ def test_unit_races_with_tables_and_elasticity_share_vectors():
 
 
 WAVES = "bearing.inner_waviness=[{order=3, amplitude_um=4.0}]"
+LOBES = "bearing.outer_waviness=[{order=2, amplitude_um=8.0, phase_deg=90.0}, {order=17, amplitude_um=0.3}]"
+
+
+@pytest.mark.parametrize(
+    "assignments",
+    [
+        (),
+        ("bearing.roller_profile=logarithmic",),
+        ("bearing.tilt_mrad=2.0",),
+        ("bearing.roller_profile=logarithmic", "bearing.tilt_mrad=0.4", "bearing.tilt_direction_deg=30"),
+        (LOBES,),
+        (LOBES, WAVES, "bearing.roller_diameter_spread_um=3.0", "bearing.roller_profile=logarithmic"),
+    ],
+)
+def test_oracle_lanes_are_contacts(make_scene, assignments):
+    """Oracle: side by side rollers feel what each feels alone, to the last bit, whatever waves and slices they meet."""
+    bearing = roller_bearing(make_scene("bearing.rollers=13", "bearing.radial_clearance_mm=-0.02", *assignments))
+    z, draw, loaded = bearing.rollers, np.random.default_rng(7), 0
+    for _ in range(50):
+        angle, y = np.arange(z) * 2.0 * np.pi / z + draw.uniform(0.0, 1.0), draw.normal(0.0, 1e-6, 5 * z + 16)
+        distance = 21.75e-3 + draw.uniform(-15e-6, 15e-6, z)
+        y[:z], y[z : 2 * z] = distance * np.cos(angle), distance * np.sin(angle)
+        y[2 * z : 4 * z], y[4 * z : 5 * z] = draw.normal(0.0, 10.0, 2 * z), draw.normal(-7e3, 500.0, z)
+        rates = np.zeros((1, y.size))
+        compiled_races(bearing, y, rates, scratch(z))
+        alone = np.array([compiled_contacts(bearing, y, j) for j in range(z)])
+        together, touching = rates[0, 2 * z : 5 * z].reshape(3, z).T, (alone[:, 3:] > 0.0).all(axis=1)
+        assert np.array_equal(together[touching], alone[touching, :3])
+        # A contact out of reach is left out, where alone it gives round-off.
+        assert together[~touching] == pytest.approx(alone[~touching, :3], rel=1e-12, abs=1e-12)
+        loaded += np.count_nonzero(touching)
+    assert 100 < loaded < 50 * z
 
 
 @pytest.mark.parametrize(

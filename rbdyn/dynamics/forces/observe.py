@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbdyn.compiled.kernel import entry
-from rbdyn.contact.hertz_line import SlicedLineContact, TiltedLineContact, closed_load, line_load, slice_drop
+from rbdyn.contact.hertz_line import SlicedLineContact, TiltedLineContact, closed_load, line_load, slice_drop, slice_of
 from rbdyn.dynamics.forces.cage import guide_forces
 from rbdyn.dynamics.forces.equations import motions, roller_pocket
 from rbdyn.dynamics.forces.races import race_observed
@@ -32,9 +32,10 @@ def spread(contact, largest_overlap, loads, nx, ny, slices):
                 low = middle
             else:
                 high = middle
-        for k in range(slices.shape[1]):
-            overlap = high - slice_drop(contact, k, nx[i], ny[i])
-            slices[i, k] = contact.share[k] * closed_load(contact.line, overlap)[0]
+        count = slices.shape[1]
+        for k in range(count):
+            overlap = high - slice_drop(contact, slice_of(contact, contact.place[k]), nx[i], ny[i])
+            slices[i, k] = closed_load(contact.line, overlap)[0] / count
 
 
 def slice_loads(

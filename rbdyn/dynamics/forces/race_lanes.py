@@ -3,7 +3,7 @@
 Whole vectors of rollers meet the outer race straight from the state. The remaining ones, and the rollers that touch the
 inner race, are packed; where both races follow the same laws they share vectors. A block takes three loops: how rollers and
 race meet, look-ups in tables one by one, which are no vector code, and the forces. So the roots and quotients of several
-vectors overlap.
+vectors overlap. Waves of a raceway and slices of the rollers are summed ahead of them.
 
 Where a scene asks for them, oil films drive the rollers that do not touch the inner race.
 """
@@ -49,11 +49,11 @@ FORCE_X, FORCE_Y, ROLLER_MOMENT, RING_MOMENT, LOAD, TRACTION, ROLLING, DAMPING, 
     0, OUTPUTS * LANES, LANES
 )
 # Where the rows between the loops begin: the fields of ``RaceApproach``, side and traction coefficient, the place in the
-# table, and four coefficients for each lane in turn.
-INPUTS = 16
+# table, four for wavy raceways and sliced rollers, and four coefficients for each lane in turn.
+INPUTS = 20
 (
     NX, NY, INVERSE, SLOPE, LEAN, MET_LOAD, STIFFNESS, MET_DAMPING, ROLLER_LEVER, RING_LEVER, SLIP, ENTRAINMENT,
-    SIDE, COEFFICIENT, ALONG, ACROSS,
+    SIDE, COEFFICIENT, ALONG, ACROSS, RADIUS, RISE, OVERLAP, APPROACH,
 ) = range(0, INPUTS * LANES, LANES)  # fmt: skip
 CUBIC = INPUTS * LANES
 ROUND_OFF = 1e-9  # of a distance
@@ -108,59 +108,34 @@ def _(sizes, packed, lane):
     return packed[RADII + lane]
 
 
-@law_of(
-    hertz_line.LineContact,
-    hertz_line.PowerLineContact,
-    hertz_line.LogarithmicLineContact,
-    races.RoundRace,
-    *TABLELESS,
-    SurfaceAxes,
-    TractionSurface,
-)
-def in_vectors(parameters):
-    """Whether neighbouring contacts with this law share vector instructions."""
-    return True
-
-
-@in_vectors.body(MixedTraction)
-def _(parameters):
-    return in_vectors(parameters.fluid)
-
-
-# Loops within keep a contact to itself.
-@in_vectors.body(hertz_line.SlicedLineContact, hertz_line.TiltedLineContact, races.WavyRace)
-def _(parameters):
+@law_of(hertz_line.LineContact, hertz_line.PowerLineContact, hertz_line.LogarithmicLineContact, races.RoundRace)
+def has_loops(parameters):
+    """Whether a contact loops over waves of the raceway or slices of the roller, ahead of the vectors."""
     return False
 
 
-@kernel
-def runs_in_vectors(race):
-    """Whether contacts of this race share vector instructions."""
-    return in_vectors(race.contact) and in_vectors(race.form) and in_vectors(race.traction)
+@has_loops.body(hertz_line.SlicedLineContact, hertz_line.TiltedLineContact, races.WavyRace)
+def _(parameters):
+    return True
 
 
 @kernel
 def lane_race(race):
     """A race as lanes read it, numbers alone: references to arrays would be counted in every lane."""
-    return races.with_laws(race, without_table(race.traction), race.tangential)
+    shaped = races.with_shape(race, races.without_waves(race.form), hertz_line.without_slices(race.contact))
+    return races.with_laws(shaped, without_table(race.traction), race.tangential)
 
 
 @kernel
 def share_vectors(outer, inner):
     """Whether one vector may hold contacts of both races."""
-    return runs_in_vectors(inner) and alike(lane_race(outer), lane_race(inner))
+    return not (has_loops(inner.contact) or has_loops(inner.form)) and alike(lane_race(outer), lane_race(inner))
 
 
 @kernel
 def whole_vectors(count):
     """``count`` rounded up to whole vectors: a scalar rest would cost as much as one more."""
     return (count + VECTOR - 1) // VECTOR * VECTOR
-
-
-@kernel
-def lanes_to_fill(race, count):
-    """Whole vectors, where contacts run in vectors; else just ``count``."""
-    return whole_vectors(count) if runs_in_vectors(race) else count
 
 
 @kernel
@@ -214,6 +189,90 @@ def keep_approach(race, side, radius, ring, source, j, stride, coefficient, met,
     met[SIDE + i] = side
     met[COEFFICIENT + i] = coefficient
     keep_place(race.traction, approach.slip, approach.load, met, i)
+
+
+@kernel
+def keep_centres(race, radius, dx, dy, met, i):
+    """Write where the roller of lane ``i`` is: direction from the ring, distance less the radius of the raceway, own radius."""
+    distance = math.sqrt(dx * dx + dy * dy)
+    inverse = 1.0 / distance
+    met[NX + i], met[NY + i] = dx * inverse, dy * inverse
+    met[OVERLAP + i], met[RADIUS + i] = distance - race.radius, radius
+
+
+@law_of(races.RoundRace)
+def keep_forms(form, ring, met, count):
+    """Write rise and slope of a wavy raceway at the first ``count`` lanes."""
+
+
+@keep_forms.body(races.WavyRace)
+def _(form, ring, met, count):
+    for i in range(count):
+        met[RISE + i], met[SLOPE + i] = races.form_at(form, met[NX + i], met[NY + i], ring.cos, ring.sin)
+
+
+@law_of(races.RoundRace)
+def form_in_lane(form, met, i):
+    """The form of a raceway as lane ``i`` meets it."""
+    return form
+
+
+@form_in_lane.body(races.FormInLane)
+def _(form, met, i):
+    return races.FormInLane(met[RISE + i], met[SLOPE + i])
+
+
+@law_of(hertz_line.LineContact, hertz_line.PowerLineContact, hertz_line.LogarithmicLineContact)
+def keep_slices(contact, form, side, met, count):
+    """Write the loads of sliced rollers in the first ``count`` lanes.
+
+    Lanes add their slices side by side, in the order of ``line_load``.
+    """
+
+
+@keep_slices.body(hertz_line.SlicedLineContact, hertz_line.TiltedLineContact)
+def _(contact, form, side, met, count):
+    laminae, filled = 0, whole_vectors(count)
+    for i in range(filled):
+        rise, _ = races.form_at(form_in_lane(form, met, i), met[NX + i], met[NY + i], 1.0, 0.0)
+        met[OVERLAP + i] = side * (met[OVERLAP + i] - rise) + met[RADIUS + i]
+        met[MET_LOAD + i] = met[STIFFNESS + i] = met[APPROACH + i] = met[LEAN + i] = 0.0
+    for i in range(count):
+        laminae = max(laminae, hertz_line.loaded_slices(contact, met[OVERLAP + i]))
+    # Two at a time, which come in whole vectors: a sum is read and written half as often.
+    for k in range(0, laminae, 2):
+        lamina, next_lamina = hertz_line.slice_of(contact, k), hertz_line.slice_of(contact, k + 1)
+        for i in range(filled):
+            overlap, nx, ny = met[OVERLAP + i], met[NX + i], met[NY + i]
+            first = hertz_line.slice_terms(contact, lamina, overlap, nx, ny)
+            second = hertz_line.slice_terms(contact, next_lamina, overlap, nx, ny)
+            met[MET_LOAD + i] = met[MET_LOAD + i] + first[0] + second[0]
+            met[STIFFNESS + i] = met[STIFFNESS + i] + first[1] + second[1]
+            met[APPROACH + i] = met[APPROACH + i] + first[2] + second[2]
+            met[LEAN + i] = met[LEAN + i] + first[3] + second[3]
+    for i in range(filled):
+        total = hertz_line.summed_load(
+            contact, met[MET_LOAD + i], met[STIFFNESS + i], met[APPROACH + i], met[LEAN + i], met[NX + i], met[NY + i]
+        )
+        met[MET_LOAD + i], met[STIFFNESS + i] = total.load, total.stiffness
+        met[APPROACH + i], met[LEAN + i] = total.approach, total.lean
+
+
+@law_of(hertz_line.LineContact, hertz_line.PowerLineContact, hertz_line.LogarithmicLineContact)
+def contact_in_lane(contact, met, i):
+    """The law of load as lane ``i`` reads it."""
+    return contact
+
+
+@contact_in_lane.body(hertz_line.SummedLoad)
+def _(contact, met, i):
+    return hertz_line.SummedLoad(met[MET_LOAD + i], met[STIFFNESS + i], met[APPROACH + i], met[LEAN + i])
+
+
+@kernel
+def race_in_lane(race, met, i):
+    """A ``lane_race`` as lane ``i`` meets it."""
+    return races.with_shape(race, form_in_lane(race.form, met, i), contact_in_lane(race.contact, met, i))
 
 
 @law_of(*TABLELESS)
@@ -292,11 +351,18 @@ def outer_approaches(race, sizes, ring, y, first, rollers, met, count):
 
     The lanes past ``count`` hold no contact.
     """
-    bare = lane_race(race)
-    for i in range(lanes_to_fill(race, count)):
+    bare, filled = lane_race(race), whole_vectors(count)
+    if has_loops(race.contact) or has_loops(race.form):
+        for i in range(filled):
+            j = first + i
+            keep_centres(bare, races.roller_radius(sizes, j), y[j] - ring.x, y[rollers + j] - ring.y, met, i)
+        keep_forms(race.form, ring, met, filled)
+        keep_slices(race.contact, bare.form, 1.0, met, count)
+    for i in range(filled):
         j = first + i
         coefficient = coefficient_of(bare.tangential, y, j)
-        keep_approach(bare, 1.0, races.roller_radius(sizes, j), ring, y, j, rollers, coefficient, met, i)
+        own_race = race_in_lane(bare, met, i)
+        keep_approach(own_race, 1.0, races.roller_radius(sizes, j), ring, y, j, rollers, coefficient, met, i)
 
 
 @kernel
@@ -305,18 +371,25 @@ def packed_approaches(outer, inner, sizes, outer_ring, inner_ring, scratch, firs
 
     There are those of the outer race only where both races share vectors.
     """
-    packed, bare_outer, bare_inner = scratch.packed, lane_race(outer), lane_race(inner)
-    for i in range(first, lanes_to_fill(inner, count)):
+    packed, met, bare_outer, bare_inner = scratch.packed, scratch.met, lane_race(outer), lane_race(inner)
+    filled = whole_vectors(count)
+    if has_loops(inner.contact) or has_loops(inner.form):
+        for i in range(filled):
+            dx, dy = packed[i] - inner_ring.x, packed[LANES + i] - inner_ring.y
+            keep_centres(bare_inner, lane_radius(sizes, packed, i), dx, dy, met, i)
+        keep_forms(inner.form, inner_ring, met, filled)
+        keep_slices(inner.contact, bare_inner.form, -1.0, met, count)
+    for i in range(first, filled):
         side = packed[SIDES + i]
         race, ring = either(side > 0.0, bare_outer, bare_inner), either(side > 0.0, outer_ring, inner_ring)
-        coefficient = packed[COEFFICIENTS + i]
-        keep_approach(race, side, lane_radius(sizes, packed, i), ring, packed, i, LANES, coefficient, scratch.met, i)
+        own_race, coefficient = race_in_lane(race, met, i), packed[COEFFICIENTS + i]
+        keep_approach(own_race, side, lane_radius(sizes, packed, i), ring, packed, i, LANES, coefficient, met, i)
 
 
 @kernel
 def wrenches(outer, inner, met, lanes, outer_count, count):
     """Write the wrenches from approaches to ``lanes``: of ``outer_count`` contacts of the outer race, then of the inner one."""
-    filled, bare_outer, bare_inner = lanes_to_fill(inner, count), lane_race(outer), lane_race(inner)
+    filled, bare_outer, bare_inner = whole_vectors(count), lane_race(outer), lane_race(inner)
     look_up(outer.traction, met, 0, outer_count)
     look_up(inner.traction, met, outer_count, filled)
     for i in range(filled):
@@ -464,6 +537,7 @@ def with_open_films(film, on_ring, race, sizes, ring, rollers, y, row, dy, scrat
 @with_open_films.body(OpenFilm, LayerFilm)
 def _(film, on_ring, race, sizes, ring, rollers, y, row, dy, scratch):
     packed, lanes, index, sums = scratch.packed, scratch.lanes, scratch.roller, on_ring
+    bare, met = lane_race(race), scratch.met
     far = (race.reach + film_reach(film)) * (1.0 + ROUND_OFF)
     j = 0
     while j < rollers:
@@ -477,11 +551,17 @@ def _(film, on_ring, race, sizes, ring, rollers, y, row, dy, scratch):
                 index[count] = j
                 count += 1
             j += 1
+        if has_loops(race.form):
+            for i in range(whole_vectors(count)):
+                radius = lane_radius(sizes, packed, i)
+                keep_centres(bare, radius, packed[i] - ring.x, packed[LANES + i] - ring.y, met, i)
+            keep_forms(race.form, ring, met, whole_vectors(count))
         for i in range(whole_vectors(count)):
+            own_race = race_in_lane(bare, met, i)
             dx, dy_ = packed[i] - ring.x, packed[LANES + i] - ring.y
             dvx, dvy = packed[2 * LANES + i] - ring.vx, packed[3 * LANES + i] - ring.vy
             radius, spin = lane_radius(sizes, packed, i), packed[4 * LANES + i]
-            keep_lane(RigidContact(), lanes, i, open_contact(film, race, radius, ring, dx, dy_, dvx, dvy, spin))
+            keep_lane(RigidContact(), lanes, i, open_contact(film, own_race, radius, ring, dx, dy_, dvx, dvy, spin))
         for i in range(count):
             add_to_roller(lanes, i, index[i], rollers, row, dy)
             sums = add_to_ring(lanes, i, sums)

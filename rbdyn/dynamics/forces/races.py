@@ -30,6 +30,13 @@ class WavyRace(NamedTuple):
     sine: NDArray[np.float64]  # b_n [m]
 
 
+class FormInLane(NamedTuple):
+    """What ``form_at`` gives where a roller meets a wavy raceway."""
+
+    rise: float  # [m]
+    slope: float  # [m/rad]
+
+
 def wavy_race(order: NDArray[np.int64], amplitude: NDArray[np.float64], phase: NDArray[np.float64]) -> WavyRace:
     """Harmonics of the radius: amplitude [m] cos(order (phi - phase)), so a lobe of the ring is at ``phase`` [rad]."""
     return WavyRace(order, amplitude * np.cos(order * phase), amplitude * np.sin(order * phase))
@@ -72,13 +79,29 @@ def _(form, nx, ny, ring_cos, ring_sin):
     return rise, slope
 
 
+@form_at.body(FormInLane)
+def _(form, nx, ny, ring_cos, ring_sin):
+    return form.rise, form.slope
+
+
+@law_of(RoundRace)
+def without_waves(form):
+    """The form as lanes read it, numbers alone."""
+    return form
+
+
+@without_waves.body(WavyRace)
+def _(form):
+    return FormInLane(0.0, 0.0)
+
+
 @law_of(RoundRace)
 def sloped(form, slope, size):
     """``slope`` times ``size``; nothing, and not computed, on a round race."""
     return 0.0
 
 
-@sloped.body(WavyRace)
+@sloped.body(WavyRace, FormInLane)
 def _(form, slope, size):
     return slope * size
 
@@ -104,6 +127,12 @@ class Race(NamedTuple):
 def with_laws(race, traction, tangential):
     """The race with other laws of traction."""
     return Race(race.radius, race.reach, race.form, race.contact, race.damping, traction, race.rolling, tangential)
+
+
+@kernel
+def with_shape(race, form, contact):
+    """A raceway of another form and law of load."""
+    return Race(race.radius, race.reach, form, contact, race.damping, race.traction, race.rolling, race.tangential)
 
 
 class EqualRollers(NamedTuple):
