@@ -75,7 +75,7 @@ class LogarithmicLineContact(NamedTuple):
 class SlicedLineContact(NamedTuple):
     """Equal slices, each relieved by the roller's profile: Q = sum_k Q_whole(delta - P_k)/m.
 
-    Slices of one drop count as one. They stand by rising drop, so that those that carry load come first.
+    Slices of one drop count as one. They stand in the order in which they begin to carry load.
     """
 
     line: Any
@@ -85,14 +85,13 @@ class SlicedLineContact(NamedTuple):
 
 
 class TiltedLineContact(NamedTuple):
-    """Slices between races of different tilt: delta_k = delta + x_k theta cos(psi - psi_0) - P_k."""
+    """Slices between races of different tilt: delta_k = delta + x_k theta cos(psi - psi_0) - P_k, in the order of P_k - |x_k theta|."""
 
     line: Any
     relief: Array  # [m]
     share: Array
     place: Whole
     rise: Array  # x_k theta [m]
-    largest_rise: float  # [m]
     direction_x: float  # cos and sin of psi_0, where the tilt is largest
     direction_y: float
 
@@ -161,23 +160,16 @@ def slice_contact(
 
     Empty slices fill them up to whole vectors.
     """
-    slices = np.column_stack((relief, position * tilt + 0.0))
-    # Rows by rising drop; between parallel rings both halves of a roller are one.
-    (drops, rises), place, count = _unequal_rows(slices)
-    padding = 0, -len(drops) % VECTOR
-    drop, share = np.pad(drops, padding, "edge"), np.pad(count / len(relief), padding)
+    rises = position * tilt + 0.0
+    rows = np.column_stack((relief - abs(rises), relief, rises))
+    # Between parallel rings both halves of a roller are one.
+    unequal, place, count = np.unique(rows, axis=0, return_inverse=True, return_counts=True)
+    padding = 0, -len(unequal) % VECTOR
+    drop, rise = (np.pad(column, padding, "edge") for column in unequal.T[1:])
+    share, place = np.pad(count / len(relief), padding), place.ravel()
     if tilt == 0.0:
         return SlicedLineContact(line, drop, share, place)
-    rise = np.pad(rises, padding)
-    return TiltedLineContact(
-        line, drop, share, place, rise, float(abs(rise).max()), math.cos(direction), math.sin(direction)
-    )
-
-
-def _unequal_rows(rows: Array) -> tuple[Array, Whole, Whole]:
-    """Columns of the unequal rows, by rising values; place among these of each row; how many rows each stands for."""
-    unequal, place, count = np.unique(rows, axis=0, return_inverse=True, return_counts=True)
-    return unequal.T, place.ravel(), count
+    return TiltedLineContact(line, drop, share, place, rise, math.cos(direction), math.sin(direction))
 
 
 @law_of(LineContact)
@@ -270,7 +262,7 @@ def _(contact, overlap, nx, ny):
 
 @law_of(SlicedLineContact)
 def slice_of(contact, k):
-    """``Slice`` number ``k``, by rising drop."""
+    """``Slice`` number ``k``."""
     return Slice(contact.relief[k], contact.share[k], 0.0)
 
 
@@ -291,21 +283,21 @@ def _(contact, lamina, nx, ny):
 
 
 @law_of(SlicedLineContact)
-def largest_rise(contact):
-    """Largest additional overlap of a slice [m]."""
-    return 0.0
+def least_overlap(contact, k):
+    """Overlap of the roller's middle above which slice ``k`` may carry load [m]."""
+    return contact.relief[k]
 
 
-@largest_rise.body(TiltedLineContact)
-def _(contact):
-    return contact.largest_rise
+@least_overlap.body(TiltedLineContact)
+def _(contact, k):
+    return contact.relief[k] - abs(contact.rise[k])
 
 
 @kernel
 def loaded_slices(contact, overlap):
     """Number of the first slices, in whole vectors, beyond which none carries load; all for NaN."""
-    count, reach = 0, overlap + largest_rise(contact)
-    while count < contact.share.size and not contact.relief[count] >= reach:
+    count = 0
+    while count < contact.share.size and not least_overlap(contact, count) >= overlap:
         count += VECTOR
     return count
 

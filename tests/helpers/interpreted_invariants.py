@@ -203,7 +203,7 @@ def no_waves():
 def flat_slices(contact, tilted):
     relief, share, place = np.zeros(32), np.array([1.0 / 31] * 31 + [0.0]), np.arange(31)
     if tilted:
-        return TiltedLineContact(contact, relief, share, place, np.zeros(32), 0.0, 1.0, 0.0)
+        return TiltedLineContact(contact, relief, share, place, np.zeros(32), 1.0, 0.0)
     return SlicedLineContact(contact, relief, share, place)
 
 
