@@ -88,15 +88,6 @@ class PartSize(AllocatedSize):
         return self.origin
 
 
-def _allocated(part: Part) -> AllocatedSize:
-    return AllocatedSize(part.nominal_mm, part.upper_mm, part.lower_mm, part.grade, part.moved_mm)
-
-
-def _size(part: Part) -> PartSize:
-    figures = part.nominal_mm, part.upper_mm, part.lower_mm, part.grade, part.moved_mm
-    return PartSize(*figures, part.fit, part.origin, part.iso_class, part.estimated, grade_words(part), part.text)
-
-
 class Linearisation(Record):
     """Errors of the linear form at mid-tolerance of a chain with functions, mm.
 
@@ -212,8 +203,8 @@ def _solved(search: Allocation, samples: int, seed: int) -> ChainResult:
         yields=assemblies.yields,
         standard_errors={law: standard_error(share, samples) for law, share in assemblies.yields.items()},
         contributions=percent,
-        allocated={part.name: _allocated(part) for part in verdict.nearest or parts},
-        sizes={part.name: _size(part) for part in parts},
+        allocated={part.name: AllocatedSize.from_attributes(part) for part in verdict.nearest or parts},
+        sizes={part.name: PartSize.from_attributes(part, grade_words=grade_words(part)) for part in parts},
         allocation=tuple(verdict.nearest or parts),
         status=verdict.status,
         mean_mm=mean,

@@ -140,14 +140,12 @@ def summary(outcome: StudyResult) -> Summary:
     study, tolerances, gains = outcome.study, outcome.tolerances, outcome.gains["pick"]
     odds = {} if outcome.robust is None else outcome.robust.odds
     forecast = Forecast(study, outcome.front, outcome.adaptive, outcome.searched_pick)
-    return Summary(
+    return Summary.from_attributes(
+        outcome,
         format=FORMAT,
         identity=study_identity("doe study", study),
-        status=outcome.status,
         limits={limit.response: PickLimit(limit.nameless, odds.get(limit.response)) for limit in outcome.limits},
-        obstacles=outcome.obstacles,
         tried=outcome.tries,
-        edge=outcome.edge,
         asked=Settings.of_runs(study, outcome.runs.replicates_a_point),
         design=StudyDesign.of(study, outcome.design, outcome.runs),
         fit=fits_of(outcome.study.surfaces),
@@ -164,18 +162,12 @@ def summary(outcome: StudyResult) -> Summary:
         whirl_sentence=whirl_sentence(study, outcome.confirmed),
         rivals_sentences=rivals_sentences(forecast, outcome.confirmed),
         chains=dict(outcome.chains),
-        made=outcome.made,
-        missed_chains=outcome.missed_chains,
-        published_comparisons=outcome.published_comparisons,
         notes=list(outcome.every_note),
         failures=grouped(outcome.failures),
         cost=dict(outcome.cost),
         versions=versions(),
-        inputs=outcome.inputs,
         seeds={"design": study.file.design.seed, "front": study.file.front.seed, "adaptive": study.file.adaptive.seed},
-        duty=outcome.duty,
         adaptive=_search(outcome),
-        robust=outcome.robust,
         tolerances=None if tolerances is None else tolerances.by_factor,
         tolerances_gains=None if tolerances is None else tolerances.by_gain,
         tolerances_sentence=None if tolerances is None else tolerances.sentence,

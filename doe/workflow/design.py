@@ -186,7 +186,7 @@ class DesignResult(Record, kw_only=True):
             kind=study.file.design.kind,
             factors=study.factors,
             reach=design.reach,
-            runs=[StandardRun(**vars(run), standard=place + 1) for run, place in runs],
+            runs=[StandardRun.from_attributes(run, standard=place + 1) for run, place in runs],
             evaluation=evaluation(study, design),
             notes=list(notes) or None,
         )

@@ -144,7 +144,7 @@ class LifeOverDuty(DutyLifeFigures):
     def of(cls, life: DutyLife, names: Sequence[str]) -> "LifeOverDuty":
         """The life of a bearing over the points of these names."""
         hours = dict(zip(names, map(finite, life.point_hours), strict=True))
-        return cls(**vars(life.figures), point_hours=hours, damage=dict(zip(names, life.damage, strict=True)))
+        return cls.from_attributes(life.figures, point_hours=hours, damage=dict(zip(names, life.damage, strict=True)))
 
 
 class DutyAnswer(Record):

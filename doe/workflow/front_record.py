@@ -139,21 +139,19 @@ class ToleranceFront(Record, kw_only=True):
             RobustPoint(study.by_factor(point), dict(zip(study.responses, values.tolist(), strict=True)), robust(costs))
             for point, values, costs in zip(points, aware.values, aware.costs, strict=True)
         ]
-        return cls(
+        return cls.from_attributes(
+            aware,
             kind=aware.box.kind,
             quantile=aware.box.quantile if aware.box.kind == "quantile" else None,
             distribution=aware.box.distribution,
             half_widths=study.by_factor(aware.box.half * study.step),
             front=front,
-            hypervolume=aware.hypervolume,
-            pick=RobustPick(**vars(front[aware.pick]), reason=aware.pick_reason),
+            pick=RobustPick.from_attributes(front[aware.pick], reason=aware.pick_reason),
             picks={rule: front[row] for rule, row in aware.picks.items()},
             baseline_robust=robust(aware.baseline_costs),
             plain_pick_robust=robust(aware.plain_pick_costs),
-            nominal_loss_percent=aware.nominal_loss_percent,
             robust_gain_percent=finite(aware.robust_gain_percent),
             pick_gains_percent={gain.response: gain.percent for gain in predicted_gains(study, points[aware.pick])},
-            survival=aware.survival,
         )
 
 
@@ -173,8 +171,8 @@ class StatedPoint(EstimatedPoint):
         """A point (k,) in factor units, compared with a front."""
         gains, place = predicted_gains(study, point), place_of(study, point)
         costs = study.goals.costs(predict_all(study.surfaces, study.coded(point)[None])[0])
-        return cls(
-            **vars(cls.predicted(study, point)),
+        return cls.from_attributes(
+            cls.predicted(study, point),
             predicted_gains={gain.response: gain for gain in gains},
             dominated_by=int(dominates(front.costs, costs).sum()),
             beyond_runs=place.beyond,
@@ -222,25 +220,22 @@ class SurfaceFront(Record, kw_only=True):
         assert sure is not None
         rows = zip(front.points, front.values, half_widths(study.surfaces, study.coded(front.points)), strict=True)
         points = [
-            FrontPoint(**vars(EstimatedPoint.of(study, *row)), non_dominated_probability=float(probability))
+            FrontPoint.from_attributes(EstimatedPoint.of(study, *row), non_dominated_probability=float(probability))
             for row, probability in zip(rows, sure.non_dominated, strict=True)
         ]
         gains, place = (predicted_gains(study, front.points[front.pick]), place_of(study, front.points[front.pick]))
         with_tolerances = None if aware is None else ToleranceFront.of(study, aware)
         picks: dict[str, FrontPoint | RobustPick] = {rule: points[row] for rule, row in front.picks.items()}
-        return cls(
+        return cls.from_attributes(
+            front,
             front=points,
-            hypervolume=front.hypervolume,
             largest_hypervolume=REFERENCE ** front.costs.shape[1],
             hypervolume_history=front.hypervolume_history.tolist(),
             ideal=_extreme(study, front, front.costs.argmin(axis=0)),
             nadir=_extreme(study, front, front.costs.argmax(axis=0)),
             knee=points[front.knee],
-            pick=FrontPick(
-                **vars(points[front.pick]),
-                reason=front.pick_reason,
-                beyond_runs=place.beyond,
-                at_bounds=place.at_bounds,
+            pick=FrontPick.from_attributes(
+                points[front.pick], reason=front.pick_reason, beyond_runs=place.beyond, at_bounds=place.at_bounds
             ),
             picks=picks if with_tolerances is None else picks | {"tolerance_aware": with_tolerances.pick},
             baseline=EstimatedPoint.predicted(study, study.baseline),
@@ -253,9 +248,6 @@ class SurfaceFront(Record, kw_only=True):
             constraints=surface_limits(study, front.points[front.pick]),
             archive=front.archive_size,
             feasible_share=front.feasible,
-            evaluations=front.evaluations,
-            generations=front.generations,
-            seed=front.seed,
             tolerance_aware=with_tolerances,
         )
 
@@ -466,16 +458,15 @@ class SearchResult(Record, kw_only=True):
         scale = costs.min(axis=0), costs.max(axis=0)
         fresh, fresh_error = noisy_hypervolume(front.costs, front.cost_errors, *scale, NOISE_DRAWS, front.seed)
         half_ranges = study.half_ranges
-        return cls(
+        return cls.from_attributes(
+            search,
             front=points,
-            pick=SearchedPoint(**vars(points[front.pick]), reason=front.pick_reason),
+            pick=SearchedPoint.from_attributes(points[front.pick], reason=front.pick_reason),
             runs=len(search.spent),
-            fresh=search.fresh,
             hypervolume=search.history[-1].reached,
             hypervolume_fresh=fresh,
             hypervolume_fresh_error=NORMAL * fresh_error,
             history=list(search.history),
-            stopped=search.stopped,
             extended=[
                 Extension(
                     study.factors[face.factor],

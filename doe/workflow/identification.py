@@ -211,8 +211,8 @@ def identified(evidence: Evidence) -> Calibration:
     cells = [_cell(evidence, place, judgement, after) for place in range(len(evidence.cells))]
     far = [] if judgement is None else np.flatnonzero(np.abs(judgement.residuals) > FAR).tolist()
     doubts = [evidence.design.doubt] if evidence.design.doubt else []
-    return Calibration(
-        made_of=evidence.made_of,
+    return Calibration.from_attributes(
+        evidence,
         scene=evidence.case.source,
         data=str(rig.path),
         verdict=NOT_CALIBRATED if contradictions else UNDECIDABLE if doubts else CALIBRATED,
@@ -228,9 +228,6 @@ def identified(evidence: Evidence) -> Calibration:
         cells=cells,
         log_evidence=None if match.sampled is None else match.sampled.log_evidence,
         volumes=match.volumes,
-        screened=evidence.screened,
-        runs=evidence.runs,
-        seed=evidence.seed,
         notes=notes,
         evidence=evidence,
     )

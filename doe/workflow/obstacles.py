@@ -65,14 +65,11 @@ class MissedLimit(Record):
         """The record of a limit that is not kept."""
         asked = study.file.response[study.responses.index(limit.response)]
         name, point = (asked.figure, asked.point) if isinstance(asked, PointResponse) else (asked.name, None)
-        return cls(
+        return cls.from_attributes(
+            limit,
             response=name,
             point=point,
-            sense=limit.sense,
-            bound=limit.bound,
             value=finite(limit.value),
-            error=limit.error,
-            verdict=limit.verdict,
             excess=finite(-limit.room),
             relaxed=finite(limit.keepable),
             probability=study.file.confirmation.limit_probability,

@@ -413,14 +413,13 @@ def _decision_by_keys(
     def decider(deciding: InputWorth) -> Decider:
         deciding_input = inputs[deciding.place]
         low, high = (_value(case, deciding_input, quantile) for quantile in deciding.flip_interval or (None, None))
-        return Decider(
+        return Decider.from_attributes(
+            deciding,
             key=deciding_input.key,
             flip=_value(case, deciding_input, deciding.flip),
-            worth=deciding.worth,
             pick_above=deciding.above,
             # Choices have no order, and so no interval.
             flip_interval=(low, high) if is_number(low) else None,
-            worth_interval=deciding.worth_interval,
         )
 
     keys, best = [unknown_input.key for unknown_input in inputs], analysis.pair

@@ -383,13 +383,12 @@ class StudyDesign(Record, kw_only=True):
             }
             for place, (values, errors) in zip(runs.places, rows, strict=True)
         }
-        return cls(
+        return cls.from_attributes(
+            study,
             kind=study.file.design.kind,
             runs=len(design.coded),
-            factors=study.factors,
-            responses=study.responses,
             points=[
-                StudyRun(**vars(run), responses=results.get(place, {}))
+                StudyRun.from_attributes(run, responses=results.get(place, {}))
                 for place, run in enumerate(design_runs(study, design))
             ],
             evaluation=evaluation(study, design),

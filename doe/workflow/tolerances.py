@@ -145,11 +145,9 @@ class PickTolerances(Record, eq=False):
             if relaxed is not None:
                 other = relaxed[name]
                 without = WithoutGain(self.limiting_gain, other.half_width, other.grade, other.limited_by)
-            tolerances[name] = FactorTolerance(
+            tolerances[name] = FactorTolerance.from_attributes(
+                widest,
                 half_width=width,
-                probability=widest.probability,
-                standard_error=widest.standard_error,
-                interval=widest.interval,
                 limited_by=RIM if rim else widest.limited_by,
                 grade=None if grade is None else grade.name,
                 parts={} if grade is None else grade.parts,

@@ -199,15 +199,13 @@ def _output(
             kind: dict(zip((entry.key for entry in inputs), shares, strict=False)) for kind, shares in effects.items()
         }
         floor = (effects.get("total") or effects["shapley"])[-1]
-    return OutputRange(
+    return OutputRange.from_attributes(
+        fitted,
         nominal=nominal.responses[name],
         input=interval,
         variance=propagation.variance_by_cause(runs, fitted),
         **by_key,
         floor=floor,
-        q2=fitted.q2,
-        ceiling=fitted.ceiling,
-        trusted=fitted.trusted,
         name=name,
         explained=propagation.explained(fitted, fitted(fresh_sets), propagation.residual_variance(fitted.emulator)),
     )

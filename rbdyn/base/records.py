@@ -101,6 +101,12 @@ class Record:
         return record
 
     @classmethod
+    def from_attributes(cls, source: Any, **values: Any) -> Self:
+        """A record of ``values``, the others from the attributes of ``source`` that are named as its fields."""
+        others = {item.name for item in fields(cls) if item.init} - values.keys()
+        return cls(**values, **{name: getattr(source, name) for name in others if hasattr(source, name)})
+
+    @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Self:
         """Inverse of ``as_dict``. Raises KeyError or TypeError for anything else."""
         own_keys = {key for _, path in json_fields(cls) for key in path[:1]}
