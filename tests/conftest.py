@@ -5,8 +5,6 @@ default laws), ``inner`` (as ``outer``, but guided on the inner ring), ``conserv
 ``everything`` (every law that goes with guidance on the outer ring).
 """
 
-from __future__ import annotations
-
 import gc
 import os
 import subprocess

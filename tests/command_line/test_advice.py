@@ -1,7 +1,5 @@
 """Advice of a refusal holds: what it says to write is accepted, and a file of another kind is named as what it is."""
 
-from __future__ import annotations
-
 import random
 import re
 

@@ -1,7 +1,5 @@
 """Input that cannot be misread: tables, TOML and studies, each fault by its smallest input."""
 
-from __future__ import annotations
-
 import json
 import math
 import shutil
@@ -52,7 +50,7 @@ def table(folder: Path, text: str | bytes):
         ("a,b,y\n1,2,3\n4,5\n", "row 2 has 2 fields and the header 3; give it a field for each column"),
         ("a,b,y\n1,2,3\n4,5,6,7\n", "row 2 has 4 fields and the header 3"),
         ("a,b,y,c,c\n1,2,3,4,5\n", "column 'c' comes 2 times; keep one"),
-        ("a,b\n1,2\n", "column 'y' is missing; add it"),
+        ("a,b\n1,2\n", "column 'y' is missing; add it, or rename the factor or response in S.toml"),
         ("a|b|y\n1|2|3\n", "has '|' between its fields; write commas there and points in numbers"),
         ('a,b,y\n1,2.5,"3,5"\n', "y in row 1 = '3,5': has a decimal comma and other numbers a decimal point; write one of them"),
         ('a,b,y\n1,2,"3,500"\n', "y in row 1 = '3,500': may mean 3500 or 3.500; write 3500 or 3.500"),
@@ -76,7 +74,7 @@ def table(folder: Path, text: str | bytes):
         ("a,b,y,y_error\n1,2,3,inf\n", "y_error in row 1 = 'inf': is not a finite number"),
         ("a,b,y,replicates\n1,2,3,-3\n", "replicates in row 1 = -3: is below 0; check the sign"),
         ("a,b,y,replicates\n1,2,3,1e300\n", "replicates in row 1 = 1e300: is beyond 1e+09"),
-        ("a,b,y,block\n1,2,3,1.5\n", "block in row 1 = 1.5: is not a whole number"),
+        ("a,b,y,block\n1,2,3,1.5\n", "block in row 1 = 1.5: is not a whole number; write a plain one"),
         ("a,b,y,run,block\n1,2,3,1,1\n1,2,3,1,2\n", "block of run 1 is 2 in one replicate and 1 in another"),
         ("a,b,y,run,y_error\n1,2,3,1,.1\n1,2,4,1,.1\n", "column y_error: rows of one run are its replicates, and it follows from their scatter"),
         ("a,b,y,run,replicates\n1,2,3,1,8\n1,2,4,1,8\n", "column replicates: rows of one run are its replicates"),

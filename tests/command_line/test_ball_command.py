@@ -1,7 +1,5 @@
 """The command ``rbdyn ball``: what it prints, writes and refuses beside the equilibrium itself."""
 
-from __future__ import annotations
-
 import json
 import math
 from pathlib import Path

@@ -1,7 +1,5 @@
 """What a command costs: its runs before they start, their time after the first; on standard error, not with -q; status counts."""
 
-from __future__ import annotations
-
 import io
 import json
 import re

@@ -1,7 +1,5 @@
 """Counts beyond memory: refused in one sentence before anything is made, or answered in bounded memory."""
 
-from __future__ import annotations
-
 import json
 import resource
 from pathlib import Path
@@ -35,15 +33,9 @@ def command(program, *arguments):
         (("ball", *BALL, "--sweep", "operation.inner_speed_rpm=1:2:99999999999"), "99999999999 values are more than"),
         (("ball", *BALL, "--preload", "1:2:99999999999"), "--preload 1:2:99999999999: 99999999999 values are more"),
         (("ball", *BALL, "--preload", f"1:2:{'9' * 5000}"), "not a list of numbers"),
-        (
-            ("map", EXAMPLE, "--speed", "1:2:99999999999", "--load", "1,2"),
-            "--speed 1:2:99999999999: 99999999999 values",
-        ),
+        (("map", EXAMPLE, "--speed", "1:2:99999999999", "--load", "1,2"), "--speed 1:2:99999999999: 99999999999"),
         (("map", EXAMPLE, "--speed", "1:2:9000", "--load", "1:2:9000"), "81000000 points are more than the 10000"),
-        (
-            ("simulate", EXAMPLE, "--turns", "1e12", "--replicates", "10000"),
-            "numerics.turns = 1000000000000.0: must be at",
-        ),
+        (("simulate", EXAMPLE, "--turns", "1e12", "--replicates", "10000"), "turns = 1000000000000.0: must be at"),
         (("simulate", EXAMPLE, "--turns", "1e6", "--replicates", "10000"), "numerics"),
     ],
 )

@@ -1,7 +1,5 @@
 """Command line of ``doe``: exit codes, messages, JSON contract, what is imported."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

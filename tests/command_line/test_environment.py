@@ -1,7 +1,5 @@
 """Whatever the environment, the clock, names and paths are: a sentence or a result, and no control character on a terminal."""
 
-from __future__ import annotations
-
 import io
 import os
 import re

@@ -1,7 +1,5 @@
 """Commands on a scene with a heat balance, as a user meets them: what they print and write, JSON keys, exit codes."""
 
-from __future__ import annotations
-
 import json
 
 import pytest

@@ -1,7 +1,5 @@
 """``doe new --duty``: points of operation from a table of a person's own, and what is refused of it."""
 
-from __future__ import annotations
-
 import tomllib
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Heat by options of ``rbdyn new``, and the files that ``rbdyn new`` and ``doe new`` write."""
 
-from __future__ import annotations
-
 import json
 import random
 import tomllib

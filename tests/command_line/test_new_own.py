@@ -1,7 +1,5 @@
 """``rbdyn new own``: a scene of one's own rollers or balls, what it estimates, and every sentence of refusal."""
 
-from __future__ import annotations
-
 import json
 import math
 import re

@@ -1,7 +1,5 @@
 """``doe new`` with limits, tolerances and dimension chains of a scene's parts."""
 
-from __future__ import annotations
-
 import json
 import tomllib
 from dataclasses import replace

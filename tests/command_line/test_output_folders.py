@@ -1,7 +1,5 @@
 """Folders of results: one belongs to one command and one file, and nobody writes over what another made."""
 
-from __future__ import annotations
-
 import errno
 import json
 import os

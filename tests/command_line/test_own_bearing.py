@@ -1,7 +1,5 @@
 """The tutorials of the manual, step by step: their commands run, and what they quote is what these print."""
 
-from __future__ import annotations
-
 import math
 import re
 import shlex

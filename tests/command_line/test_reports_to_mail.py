@@ -1,7 +1,5 @@
 """What --out writes to be mailed: report.html in one file, tables.xlsx with the numbers of the CSV files."""
 
-from __future__ import annotations
-
 import csv
 import re
 import subprocess

@@ -1,7 +1,5 @@
 """REXS files: bearings of a gearbox program as scenes, and results written for it."""
 
-from __future__ import annotations
-
 import tomllib
 from pathlib import Path
 
@@ -71,11 +69,7 @@ def test_what_cannot_be_read_is_a_sentence(tmp_path):
     assert "has 2 bearings; choose one by --bearing: 2 (left), 9 (T)" in in_process("rbdyn", "new", str(both)).stderr
     assert in_process("rbdyn", "new", str(both), "--bearing", "left").returncode == 0
     for text, bearing, words in (
-        (
-            CATALOGUE.replace("OTHER", TAPERED),
-            "9",
-            "bearing 9 (T) is a tapered roller bearing; rbdyn reads cylindrical roller",
-        ),
+        (CATALOGUE.replace("OTHER", TAPERED), "9", "bearing 9 (T) is a tapered roller bearing; rbdyn reads"),
         (CATALOGUE.replace("OTHER", ""), "8", "--bearing 8: is none of"),
         ("<model><components/></model>", None, "has no rolling bearing"),
         ("<svg/>", None, "no REXS file, since it begins with <svg>"),

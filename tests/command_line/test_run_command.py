@@ -1,7 +1,5 @@
 """``doe run``: a table of scenes, its failures, its parts, and what reads its files."""
 
-from __future__ import annotations
-
 import csv
 import json
 import shutil

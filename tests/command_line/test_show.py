@@ -1,7 +1,5 @@
 """The command ``rbdyn show`` as a user meets it, and the moving pictures it writes."""
 
-from __future__ import annotations
-
 import json
 import re
 

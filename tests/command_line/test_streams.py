@@ -4,8 +4,6 @@ What Python makes of its streams as it starts is tried once for each kind of end
 commands run in children of this process.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import re

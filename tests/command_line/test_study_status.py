@@ -1,7 +1,5 @@
 """``doe status``: counts, causes, who runs what, time left; it changes nothing."""
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess

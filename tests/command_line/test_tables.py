@@ -1,7 +1,5 @@
 """Tables on terminals of several widths: no word of a heading is broken."""
 
-from __future__ import annotations
-
 import io
 import json
 import sys

@@ -1,7 +1,5 @@
 """The example scripts: each imports, and each published check gives its number in a quick variant."""
 
-from __future__ import annotations
-
 import importlib.util
 import json
 import math

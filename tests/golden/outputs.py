@@ -4,8 +4,6 @@ A folder of ``outputs`` holds a case. Long lists and tables stand there by their
 Nothing that differs between two runs is in them: clocks stand still, dates and versions are masked.
 """
 
-from __future__ import annotations
-
 import contextlib
 import csv
 import hashlib

@@ -5,8 +5,6 @@ these cases, ``... regenerate.py`` everything. That is right only where a law, a
 purpose; the difference of the files says how far the numbers moved and what else changed.
 """
 
-from __future__ import annotations
-
 import json
 import platform
 import sys

@@ -1,7 +1,5 @@
 """Ball bearings that several tests share: tables of scenes, and solutions that are checked."""
 
-from __future__ import annotations
-
 import copy
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Two small compiled functions, their machine code in a folder of one's choice, and ways to spoil a file."""
 
-from __future__ import annotations
-
 import random
 import shutil
 from collections.abc import Callable

@@ -4,8 +4,6 @@ Its front is rough; its stages, budget, files and sentences are those of a whole
 ``test_adaptive``.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 from doe.adaptive import emulators, search

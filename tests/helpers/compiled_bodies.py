@@ -5,8 +5,6 @@ a list of assignments to the example. Standard output: for each scene, "module:l
 or for one before it.
 """
 
-from __future__ import annotations
-
 import json
 import sys
 

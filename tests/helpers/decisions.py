@@ -1,7 +1,5 @@
 """Gains of pairs whose truth is known: which input decides, where, and what it is worth."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """The command ``doe``: what it prints, and what it loads in a process of its own."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 

@@ -3,8 +3,6 @@
 What Python itself does with its streams before the first import is the subject of the few tests that start an interpreter.
 """
 
-from __future__ import annotations
-
 import gc
 import importlib
 import os

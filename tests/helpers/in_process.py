@@ -3,8 +3,6 @@
 Streams of a real process, signals and what is loaded are the subjects of ``test_streams`` and of the tests that start one.
 """
 
-from __future__ import annotations
-
 import importlib
 import io
 import os

@@ -5,8 +5,6 @@ responses and the seeds that ran or leaves as a command does; with ``--whole`` i
 standard error.
 """
 
-from __future__ import annotations
-
 import sys
 import time
 from collections.abc import Collection

@@ -4,8 +4,6 @@ Every scene is another set of law types, which the interpreter takes as it comes
 seconds each.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from conftest import EVERYTHING, UNSAMPLED, make, right_hand_side, state_near_contact

@@ -4,8 +4,6 @@
 parameters by hand, for a scene that says them builds the plain path.
 """
 
-from __future__ import annotations
-
 import functools
 import math
 
@@ -110,45 +108,26 @@ NO_GUIDE = guide(lambda g: NoGuide())
 # What leaves the option out, and the general path with a value that says nothing.
 NEUTRAL = {
     "contact law of Houpert": (
-        itself,
-        lambda b: on_both(b, contact=lambda race: PowerLineContact(race.contact.stiffness, 10.0 / 9.0)),
+        itself, lambda b: on_both(b, contact=lambda race: PowerLineContact(race.contact.stiffness, 10.0 / 9.0))
     ),
     "logarithmic profile, 31 slices": (itself, REWRITTEN["31 slices"]),
     "tilt, 31 slices": (itself, REWRITTEN["31 slices, tilt of nothing"]),
     "unequal rollers": (itself, REWRITTEN["rollers of equal radii"]),
     "two-lobed outer race": (itself, REWRITTEN["waves of no height"]),
-    "wavy inner race, with clock": (
-        itself,
-        lambda b: clocked(Constant)(REWRITTEN["waves of no height"](b)),
-    ),
+    "wavy inner race, with clock": (itself, lambda b: clocked(Constant)(REWRITTEN["waves of no height"](b))),
     "traction by pressure and temperature": (races(traction=NoTraction()), races(traction=NO_TABLE)),
     "mixed friction": (itself, REWRITTEN["asperities that carry nothing"]),
     "dry traction": (races(traction=NoTraction()), races(traction=CoulombTraction(0.0, 0.02))),
-    "without traction": (
-        races(traction=NoTraction()),
-        races(traction=FourConstantTraction(0.0, 0.0, 1.0, 0.0)),
-    ),
+    "without traction": (races(traction=NoTraction()), races(traction=FourConstantTraction(0.0, 0.0, 1.0, 0.0))),
     "without race damping": (races(damping=NoDamping()), races(damping=ViscousDamping(0.0, 1e7))),
-    "without rolling resistance": (
-        races(rolling=NoRollingResistance()),
-        races(rolling=RollingResistance(0.0, 1.0)),
-    ),
+    "without rolling resistance": (races(rolling=NoRollingResistance()), races(rolling=RollingResistance(0.0, 1.0))),
     "starved inlets": (
-        itself,
-        lambda b: on_both(
-            b, rolling=lambda race: StarvedRollingResistance(*race.rolling, 1.0, 0.0, 0.0, 0.0)
-        ),
+        itself, lambda b: on_both(b, rolling=lambda race: StarvedRollingResistance(*race.rolling, 1.0, 0.0, 0.0, 0.0))
     ),
     "films at open inner contacts": (itself, lambda b: b._replace(open_film=OpenFilm(0.0, 0.0, 1e-6))),
-    "pocket film": (
-        itself,
-        pocket(lambda p: LubricatedPocket(p, NO_POCKET_FILM, p.half_clearance, p.nominal_radius)),
-    ),
+    "pocket film": (itself, pocket(lambda p: LubricatedPocket(p, NO_POCKET_FILM, p.half_clearance, p.nominal_radius))),
     "rigid pocket bars": (rigid, on_bar(1e30)),
-    "without pockets": (
-        pocket(lambda p: NoPocket()),
-        pocket(lambda p: p._replace(half_clearance=OUT_OF_REACH)),
-    ),
+    "without pockets": (pocket(lambda p: NoPocket()), pocket(lambda p: p._replace(half_clearance=OUT_OF_REACH))),
     "guidance on the inner ring": (NO_GUIDE, guide(lambda g: InnerGuide(g.radius, NoFilm(), NoContact()))),
     "guidance by the rollers": (
         NO_GUIDE,
@@ -171,17 +150,13 @@ NEUTRAL = {
     "rotating load, with clock": (itself, clocked(Constant)),
     "speed and load by schedule": (itself, clocked(Ramps)),
     "gravity": (itself, REWRITTEN["no weight"]),
-    "without drag": (
-        lambda b: b._replace(drag=NoDrag()),
-        lambda b: b._replace(drag=CylinderDrag(0.0)),
-    ),
+    "without drag": (lambda b: b._replace(drag=NoDrag()), lambda b: b._replace(drag=CylinderDrag(0.0))),
     # Further laws, which no line of the table of options stands for.
     "film of a layer thinner than every gap": (itself, lambda b: b._replace(open_film=LayerFilm(1.0, 1.0, 1e-6, 1e6))),
     "schedule in steps": (itself, clocked(Steps)),
     "schedule in smooth ramps": (itself, clocked(SmoothRamps)),
     "traction at rest": (
-        itself,
-        lambda b: on_both(b, traction=lambda race: BlendedFourConstantTraction(*race.traction, 0.0)),
+        itself, lambda b: on_both(b, traction=lambda race: BlendedFourConstantTraction(*race.traction, 0.0))
     ),
     "restitution of one": (
         pocket(lambda p: p._replace(damping=NoDamping())),

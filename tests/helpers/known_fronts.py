@@ -4,8 +4,6 @@ Sources: Zitzler, Deb and Thiele, Comparison of multiobjective evolutionary algo
 Zitzler, Scalable test problems for evolutionary multiobjective optimization (2005), DTLZ2.
 """
 
-from __future__ import annotations
-
 from functools import cache
 from pathlib import Path
 

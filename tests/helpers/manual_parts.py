@@ -1,7 +1,5 @@
 """The manual as it is installed: the parts of both floors, found by what pyproject.toml declares."""
 
-from __future__ import annotations
-
 import functools
 import tomllib
 from importlib.metadata import EntryPoint

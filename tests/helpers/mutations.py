@@ -1,7 +1,5 @@
 """What fuzz tests share: mutations of files, and whether a mutated file is read or refused in sentences."""
 
-from __future__ import annotations
-
 import random
 import re
 import time

@@ -1,7 +1,5 @@
 """Objectives with known fronts, and the surfaces of the published table, that several tests share."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """What the programs, their manual and the README say: messages, docstrings and running text, sentence by sentence."""
 
-from __future__ import annotations
-
 import ast
 import functools
 import re

@@ -1,7 +1,5 @@
 """Workbooks written part by part, so that a test can hold what no spreadsheet writes."""
 
-from __future__ import annotations
-
 import zipfile
 from collections.abc import Iterable
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The report of the made-up study as a reader opens it in a browser."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path

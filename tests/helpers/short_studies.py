@@ -1,7 +1,5 @@
 """The example study on a simulation that is short, and what its store holds."""
 
-from __future__ import annotations
-
 import re
 import shutil
 import sqlite3

@@ -1,7 +1,5 @@
 """One function of each kind that ``rbdyn.compiled`` makes, and what they answer."""
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Runs of one replicate by a method of one's choice, and a smooth stretch on which orders of convergence show."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

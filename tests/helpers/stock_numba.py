@@ -4,8 +4,6 @@
 compiler and the numbers of each case.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess

@@ -1,7 +1,5 @@
 """A small made-up record of ``doe study --json`` with every part there is, and a motion to go with it."""
 
-from __future__ import annotations
-
 import functools
 import itertools
 import math

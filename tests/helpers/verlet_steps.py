@@ -1,7 +1,5 @@
 """State of the example with tangential elasticity after a few steps of velocity Verlet: printed by a process that compiles nothing."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

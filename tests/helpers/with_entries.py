@@ -3,8 +3,6 @@
 The entries are a figure, a loss and a clearance; each is added to the text of its one list before anything reads it.
 """
 
-from __future__ import annotations
-
 import json
 import sys
 import types

@@ -1,7 +1,5 @@
 """Equilibrium of a row of balls: 30 digits, closed forms, invariants, stiffness, rate, starts."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What holds for any state and any path: symmetries, momentum, power. Scenes of every make are tried interpreted."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

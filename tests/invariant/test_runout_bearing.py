@@ -1,7 +1,5 @@
 """Runout of a bearing with form errors: which orders pass, what a lot yields, the published cases."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from pathlib import Path

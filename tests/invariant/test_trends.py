@@ -1,7 +1,5 @@
 """Trends that physics demands, each beyond the 95 % error of the difference; the default laws, only numbers changed."""
 
-from __future__ import annotations
-
 import functools
 import math
 from itertools import pairwise

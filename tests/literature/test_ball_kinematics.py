@@ -1,7 +1,5 @@
 """Orbit and spin of a ball between two races: rolling by vectors, Jones's limits, the sign of the gyroscopic moment."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Fatigue life and ratings of a row of balls: a commercial report, tables of the standards, closed forms, invariants."""
 
-from __future__ import annotations
-
 import importlib
 import math
 from pathlib import Path

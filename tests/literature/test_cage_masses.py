@@ -1,7 +1,5 @@
 """The estimate of a cage compared with what a maker's catalogue weighs beyond rings and rollers."""
 
-from __future__ import annotations
-
 import math
 import runpy
 

@@ -1,7 +1,5 @@
 """Interiors estimated from catalogues, beside what is known of them."""
 
-from __future__ import annotations
-
 import csv
 import math
 

@@ -1,7 +1,5 @@
 """Damping, traction and film laws alone: published numbers, closed forms, energies, and compiled against interpreted."""
 
-from __future__ import annotations
-
 import math
 from decimal import Decimal
 

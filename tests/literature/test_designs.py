@@ -1,7 +1,5 @@
 """Designs: published tables, rotatability, orthogonal blocks, coding."""
 
-from __future__ import annotations
-
 from itertools import product
 
 import numpy as np

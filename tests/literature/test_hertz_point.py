@@ -1,7 +1,5 @@
 """Point contact: tables, closed forms, an independent root, limits and symmetry."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

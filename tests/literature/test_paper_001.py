@@ -1,7 +1,5 @@
 """The figures of Hu et al. on the contact angles of a double-decker bearing: our numbers beside their statements."""
 
-from __future__ import annotations
-
 import importlib
 from pathlib import Path
 

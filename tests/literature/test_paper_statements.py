@@ -1,7 +1,5 @@
 """What the texts of two papers on ball bearings state, and the only measurement of the source papers: ours next to it."""
 
-from __future__ import annotations
-
 import importlib
 import math
 from pathlib import Path

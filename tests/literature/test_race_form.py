@@ -1,7 +1,5 @@
 """Waviness: the form itself, its force and moment as virtual work, and the rule that only orders kZ +- 1 shake a ring."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

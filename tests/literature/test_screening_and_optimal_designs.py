@@ -1,7 +1,5 @@
 """Definitive screening, D- and I-optimal designs against published properties, closed forms and free optimisation."""
 
-from __future__ import annotations
-
 from functools import cache
 from itertools import combinations
 
@@ -194,10 +192,7 @@ def test_seeds_and_settings_fix_the_bits():
             lambda: optimal(3, criterion="i", runs=4, centre_replicates=3),
             "runs = 4: with 3 at the centre too few for a model of 10 terms; give at least 8",
         ),
-        (
-            lambda: optimal(2, criterion="d", runs=501),
-            "runs = 501: exchanges among more than 500 take long; give fewer",
-        ),
+        (lambda: optimal(2, criterion="d", runs=501), "runs = 501: exchanges among more than 500 take long"),
     ],
 )
 def test_bad_designs_are_refused(make, words):

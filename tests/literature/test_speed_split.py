@@ -1,7 +1,5 @@
 """How a double-decker bearing divides its speed: published rule, limits, invariants."""
 
-from __future__ import annotations
-
 import math
 
 import pytest

@@ -1,7 +1,5 @@
 """Stiffness of a cage's bars: limits, closed forms, and finite elements of three pitches as an independent solution."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """How companions are chosen: by the steps that the runs took, and what these do to rollers that lie lightly."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

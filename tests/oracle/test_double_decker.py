@@ -1,7 +1,5 @@
 """Double-decker ball bearing: all coupled equations, limits, published conditions, prescribed displacements, input."""
 
-from __future__ import annotations
-
 import json
 import math
 import tomllib

@@ -1,7 +1,5 @@
 """The right-hand side: against its numpy twin, compiled against interpreted, and what each switch silences."""
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess

@@ -1,7 +1,5 @@
 """Error bars: coverage on synthetic series and on the bearing, bias from companions, transients, target accuracy."""
 
-from __future__ import annotations
-
 import json
 import math
 

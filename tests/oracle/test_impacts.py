@@ -1,7 +1,5 @@
 """Impacts that are followed one by one, against closed forms: a roller on a wall, and forces that are known."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from conftest import ROOT

@@ -1,7 +1,5 @@
 """Integrators beside each other: orders of the fixed steps, agreement, errors, failures, times at equal error."""
 
-from __future__ import annotations
-
 import importlib.util
 import itertools
 import sys

@@ -1,7 +1,5 @@
 """Films of open inner contacts: the law against Reynolds's equation, its limits, and bearings that it drives."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The cage pocket: film of a wall against Reynolds' equation, its wrench, hand-over to contact, and the lips."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Samples of race contacts against closed forms: quantiles, power density, flash temperature, entries."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Traction of an oil film from its rheology, and the film itself: published numbers, closed forms and limits."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from itertools import pairwise

@@ -1,7 +1,5 @@
 """Rolling resistance, flooded and starved: against Reynolds's equation solved three ways, in its limits, and in a run."""
 
-from __future__ import annotations
-
 import math
 
 import line_film_oracle as oracle

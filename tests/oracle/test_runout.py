@@ -1,7 +1,5 @@
 """Circles about an orbit, runout of paths whose runout is known, class limits."""
 
-from __future__ import annotations
-
 import importlib
 import itertools
 import math

@@ -1,7 +1,5 @@
 """Tangential elasticity: how coefficients follow, its limits, and bearings that run with it as without."""
 
-from __future__ import annotations
-
 import math
 from itertools import pairwise
 

@@ -5,8 +5,6 @@ Axes of a ball are (axial, radial, along the orbit); with e_z x e_r = e_psi a ro
 the orbit by w_z r - w_r z. A number context of mpmath does the sums: ``mp`` or, in doubles, ``fp``.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

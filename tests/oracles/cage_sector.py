@@ -7,8 +7,6 @@ A quarter is meshed: the plane across the middle of the bars mirrors it, the pla
 the other sign. Hexahedra of 27 nodes.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

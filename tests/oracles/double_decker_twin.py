@@ -4,8 +4,6 @@ An oracle for tests: no code shared with ``rbdyn.quasistatic``. Hertz by complet
 a ball from the two conditions of rolling, solved as a linear system for each ball.
 """
 
-from __future__ import annotations
-
 import functools
 import math
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """The film of a rigid cylinder on a plane without any fit: by quadrature, and by complementarity on a grid."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Four-constant law of traction, fitted to a curve by least squares."""
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

@@ -5,8 +5,6 @@ rolling force per surface, 1/2 int (h - h_m) p' dx, and start the pressure at a 
 L = G U^0.25 with U = 2 eta u/(E' R).
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -6,8 +6,6 @@ a complex step; films carry no moment of their own; an unbalanced cage moves abo
 film is integrated over angle. The scalar laws stand in ``numpy_twin_laws``.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any, NamedTuple
 

@@ -4,8 +4,6 @@ No kernel of ``rbdyn``: implicit laws are bracketed, slices are looped over, the
 one thing taken from the package is the traction coefficient of a rheology, which other tests hold against quadrature.
 """
 
-from __future__ import annotations
-
 import functools
 import math
 

@@ -4,8 +4,6 @@ Both contacts of a ball act as one spring c_P between the centres of the grooves
 displacements, so the equilibrium is the one minimum of an energy, found by guarded Newton steps from anywhere.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

@@ -4,8 +4,6 @@ Source: National Institute of Standards and Technology, Statistical Reference Da
 Longley (1967), Wampler 1-5 (1970), Filippelli.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from fractions import Fraction
 

@@ -1,7 +1,5 @@
 """Intervals of a fitted surface by Student's t, on the scale of the response."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy import special
 

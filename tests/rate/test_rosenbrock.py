@@ -1,7 +1,5 @@
 """The linearly implicit method: its table, linear algebra and Jacobian, order, stability, and agreement with the other."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import numpy as np

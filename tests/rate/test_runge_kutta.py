@@ -1,7 +1,5 @@
 """The integrator: order, dense output, agreement with scipy, refusals, conserved energy and closed power balance."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 from types import SimpleNamespace
 

@@ -1,7 +1,5 @@
 """A cage that thick oil stops within a step: resistance of the film, decay, order, price, and where no scene pays for it."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Velocity Verlet for bearings: order, dense output, stability, the trapezoidal rule in a contact, power balance, equal figures."""
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess

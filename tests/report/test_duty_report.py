@@ -1,7 +1,5 @@
 """The duty in the answer: verdicts at each point, worst points, the cost of the compromise, life and energy, in any width."""
 
-from __future__ import annotations
-
 import copy
 
 import pytest

@@ -1,7 +1,5 @@
 """The emulators of a search in the report, used as a reader would in a headless browser: their figures are Python's."""
 
-from __future__ import annotations
-
 import re
 from types import SimpleNamespace
 from typing import Any

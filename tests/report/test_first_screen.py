@@ -1,7 +1,5 @@
 """The first screen of a study: its order, its tone, and why no better point is the selected design."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import replace
 from datetime import date

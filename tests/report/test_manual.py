@@ -1,7 +1,5 @@
 """``rbdyn manual``: every key, command, equation and public name is there, and what its prose names exists."""
 
-from __future__ import annotations
-
 import ast
 import importlib
 import json

@@ -1,7 +1,5 @@
 """Figures that the manual quotes: each stands in the prose once, and is that of a run of the commands of its page."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import manual_figures

@@ -1,7 +1,5 @@
 """The manual in a real browser without a network: opens, finds, fits a phone, prints."""
 
-from __future__ import annotations
-
 import base64
 import re
 

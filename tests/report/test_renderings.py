@@ -1,7 +1,5 @@
 """One tree of blocks, two renderings: the same figures with the same digits on a terminal and as HTML."""
 
-from __future__ import annotations
-
 import html
 import re
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """The report of a study as text: what it says, what it leaves out, and that no name can break it."""
 
-from __future__ import annotations
-
 import copy
 import json
 import re

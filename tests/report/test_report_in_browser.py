@@ -1,7 +1,5 @@
 """The report in a real browser without a network: it draws, turns, slides, plays, prints, and keys reach all of it."""
 
-from __future__ import annotations
-
 import base64
 import json
 import math

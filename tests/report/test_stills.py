@@ -1,7 +1,5 @@
 """Still pictures: the same text for the same marks, colours of the page, numbers in their places, matplotlib only when drawn."""
 
-from __future__ import annotations
-
 import os
 import re
 import subprocess

@@ -4,8 +4,6 @@
 time of each.
 """
 
-from __future__ import annotations
-
 import sys
 import time
 import tomllib

@@ -1,7 +1,5 @@
 """Equilibrium of a row of balls where it is hard to find: loads, speeds, angles and clearances at their ends."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from ball_scenes import CAGE, HARD, LARGE, balanced, model_of, scene

@@ -1,7 +1,5 @@
 """Fuzz: files that the programs keep for themselves, spoilt in any way, change no answer and are good again afterwards."""
 
-from __future__ import annotations
-
 import json
 import random
 import sqlite3

@@ -1,7 +1,5 @@
 """Fuzz: designations and options of ``rbdyn new`` are honoured in the scene, or refused in sentences of one bounded line."""
 
-from __future__ import annotations
-
 import random
 import re
 import tomllib

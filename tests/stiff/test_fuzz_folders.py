@@ -4,8 +4,6 @@ Each case fills a folder at random and runs a command there. A command that refu
 files that it made itself, with ``--force`` also over others, never over one that it reads.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 import os

@@ -1,7 +1,5 @@
 """Fuzz: mutated inputs are read or refused in sentences of one bounded line, and quickly; nothing is simulated."""
 
-from __future__ import annotations
-
 import json
 import random
 import re

@@ -1,7 +1,5 @@
 """Fuzz: what a refused chain is told to write is accepted once it is written."""
 
-from __future__ import annotations
-
 import random
 import re
 from collections import Counter

@@ -1,7 +1,5 @@
 """Fuzz: rig tables, samples and tables without a study are read as they are written, or refused in sentences; nothing is simulated."""
 
-from __future__ import annotations
-
 import csv
 import io
 import random

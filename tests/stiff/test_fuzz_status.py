@@ -1,7 +1,5 @@
 """``doe status`` of any store: whatever was noted, run, killed or spoilt, it says finished of an answer only."""
 
-from __future__ import annotations
-
 import json
 import random
 import sqlite3

@@ -1,7 +1,5 @@
 """Fuzz: random [uncertain] tables are honoured in every scene that they make, or refused in sentences; nothing is simulated."""
 
-from __future__ import annotations
-
 import copy
 import math
 import random

@@ -1,7 +1,5 @@
 """Two hundred random extreme roller scenes under random laws: each ends with a result, a sentence or its budget."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Stiff and extreme scenes: each case closes its power balance or tells what to change."""
 
-from __future__ import annotations
-
 import json
 
 import pandas as pd

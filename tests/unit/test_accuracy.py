@@ -1,7 +1,5 @@
 """Accuracy studies: bias over tolerances, slices, replicates, the files they write, and the command."""
 
-from __future__ import annotations
-
 import json
 
 import pytest
@@ -104,10 +102,7 @@ def test_command_accuracy(command, tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ("words", "says"),
     [
-        (
-            ("slices",),
-            "slices: is not a study of a bearing of kind 'cylindrical_roller'; choose tolerances or methods or ",
-        ),
+        (("slices",), "is not a study of a bearing of kind 'cylindrical_roller'; choose tolerances or methods"),
         (("tolerances", "--set", "numerics.replicates=1"), "numerics.replicates = 1"),
     ],
 )

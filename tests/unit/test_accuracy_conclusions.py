@@ -1,7 +1,5 @@
 """What the accuracy studies conclude: nothing from noisy tables, the right thing from sharp ones."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The adaptive search: its integral in closed form, greed without twins, goals, limits, when it stops, known fronts."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from itertools import combinations
 

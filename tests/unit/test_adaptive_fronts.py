@@ -1,7 +1,5 @@
 """Adaptive searches on fronts that are known, compared with even runs and the direct search; sources in ``known_fronts``."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from known_fronts import (

@@ -1,7 +1,5 @@
 """Forces on one ball: against 40 digits for every raceway control, derivatives, smoothness, textbook law, action and reaction."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

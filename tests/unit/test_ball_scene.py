@@ -1,7 +1,5 @@
 """Scenes of ball bearings: every fault in a sentence, defaults, what the command prints and how it exits."""
 
-from __future__ import annotations
-
 import copy
 import json
 import math

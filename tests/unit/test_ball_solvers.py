@@ -1,7 +1,5 @@
 """Solvers of the equilibrium of balls beside the convex one: full system, plain Newton, MINPACK, finite search, battery."""
 
-from __future__ import annotations
-
 import ball_solvers
 import minpack
 import numpy as np

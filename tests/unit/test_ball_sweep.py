@@ -1,7 +1,5 @@
 """Sweeps of ball bearings: the same equilibria as one by one, failures, messages, files, pictures and the command."""
 
-from __future__ import annotations
-
 import json
 from types import SimpleNamespace
 

@@ -1,7 +1,5 @@
 """Power transforms of a response: profile likelihood against published data and oracles, there and back."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

@@ -1,7 +1,5 @@
 """Limits of a study on the class of its cage: judged at the simulated pick by the classes of its replicates."""
 
-from __future__ import annotations
-
 import json
 import re
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """The radius of the cage's orbit: closed forms, what a result and a study say of a jitter, and the sums behind it."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """The section of a cage in a scene: what follows from it, what overrules it, what is refused, how it is unknown."""
 
-from __future__ import annotations
-
 import tomllib
 from pathlib import Path
 

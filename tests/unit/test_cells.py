@@ -1,7 +1,5 @@
 """Tables that a spreadsheet may open: text that looks like a formula is quoted, and read as it was."""
 
-from __future__ import annotations
-
 import csv
 import json
 import random

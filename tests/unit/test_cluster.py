@@ -1,7 +1,5 @@
 """Runs on a dask cluster: a real scheduler and workers on this machine, one of which is killed."""
 
-from __future__ import annotations
-
 import json
 import os
 import signal

@@ -1,7 +1,5 @@
 """Comparison of two bearings: which inputs differ, and which differences are more than their errors."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from pathlib import Path

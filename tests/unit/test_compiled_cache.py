@@ -1,7 +1,5 @@
 """Machine code on disk: loaded where it is as it was written, else made anew; nothing that lies there stops a run."""
 
-from __future__ import annotations
-
 import errno
 import importlib.util
 import logging

@@ -1,7 +1,5 @@
 """How kernels are compiled into what Python calls."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """Figures of damage: sliding and impacts of the cage."""
 
-from __future__ import annotations
-
 import json
 from functools import cache
 from types import SimpleNamespace

@@ -1,7 +1,5 @@
 """Dangers: each judgement at its limit, what a status follows from, that every code is used, and how results keep their notes."""
 
-from __future__ import annotations
-
 import ast
 import json
 import math

@@ -1,7 +1,5 @@
 """What a design can tell, against closed forms, published figures and statsmodels; designs that fill a box."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The design of a study: settings, seeds, faults in sentences, what the command prints."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 
@@ -113,16 +111,8 @@ def test_impossible_settings_are_named(tmp_path, lines, factors, words):
         ('kind = "sobol"\nruns = 10', "quadratic", "the 10 runs of the design are too few; it needs 11 (10 terms and"),
         ('kind = "sobol"\nruns = 4', "linear", "it needs 5 (4 terms and one to judge the fit)"),
         ('kind = "full_factorial"\nlevels = 2\ncentre_replicates = 4', "reduced", "cannot separate B^2, C^2 from"),
-        (
-            'kind = "d_optimal"\nruns = 10',
-            "quadratic",
-            "raise design.runs or choose a simpler model (pure_quadratic or interaction or linear)",
-        ),
-        (
-            'kind = "definitive_screening"',
-            "quadratic",
-            "it needs 11 (10 terms and one to judge the fit): enlarge the design or",
-        ),
+        ('kind = "d_optimal"\nruns = 10', "quadratic", "choose a simpler model (pure_quadratic or interaction"),
+        ('kind = "definitive_screening"', "quadratic", "it needs 11 (10 terms and one to judge the fit)"),
         ('alpha = "spherical"\ncentre_replicates = 0', "quadratic", "cannot separate C^2 from the other terms"),
     ],
 )

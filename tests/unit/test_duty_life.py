@@ -1,7 +1,5 @@
 """Life over a duty: closed forms of Palmgren and Miner and of the equivalent load, and the static loads behind each life."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Simulation at each point of a duty: figures, the worst point, lives, and points that fail."""
 
-from __future__ import annotations
-
 import csv
 import json
 from dataclasses import replace

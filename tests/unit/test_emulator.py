@@ -1,7 +1,5 @@
 """The emulator: scikit-learn's own kernels at equal hyperparameters, leaving out = refitting, moments of draws, recovery."""
 
-from __future__ import annotations
-
 import warnings
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The Gaussian process beside the polynomial: closed form, determinism, and a fair comparison."""
 
-from __future__ import annotations
-
 import warnings
 
 import numpy as np

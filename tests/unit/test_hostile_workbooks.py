@@ -1,7 +1,5 @@
 """Workbooks that no spreadsheet writes are refused in a sentence, within bounds of time and memory; careless ones never misread."""
 
-from __future__ import annotations
-
 import random
 import re
 import resource

@@ -1,7 +1,5 @@
 """Heat balance of a row of balls: the fixed point and its gain, runaway, verdicts, and what a scene with it refuses."""
 
-from __future__ import annotations
-
 import json
 import re
 import subprocess

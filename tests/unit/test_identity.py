@@ -1,7 +1,5 @@
 """The identity of a result: bearing and operating point in words, date, version, hashes of the input files."""
 
-from __future__ import annotations
-
 import hashlib
 from datetime import date
 from importlib.metadata import version

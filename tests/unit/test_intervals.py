@@ -1,7 +1,5 @@
 """Student's intervals that hold together, at few degrees of freedom."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy import special

@@ -1,7 +1,5 @@
 """What a scene does not need is not there: not computed, not compiled, not stored, not imported, with the same result."""
 
-from __future__ import annotations
-
 import gc
 import importlib
 import json

@@ -1,7 +1,5 @@
 """What the model leaves out: each estimate by hand, and the notes where it matters."""
 
-from __future__ import annotations
-
 import math
 from itertools import pairwise
 

@@ -1,7 +1,5 @@
 """The functions of ``doe``: they do what the commands do, and their answers show, tabulate and save themselves."""
 
-from __future__ import annotations
-
 import json
 import pickle
 from html.parser import HTMLParser

@@ -1,7 +1,5 @@
 """Reference rating life: tables, a commercial program's report, closed forms, limits and invariants."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Line contact: four laws and their slices against published numbers, against each other, and their own derivatives."""
 
-from __future__ import annotations
-
 import math
 from itertools import pairwise
 

@@ -1,7 +1,5 @@
 """The slip map and the cost of options: points, failures, tables, files, and the command."""
 
-from __future__ import annotations
-
 import json
 import signal
 import subprocess

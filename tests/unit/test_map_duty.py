@@ -1,7 +1,5 @@
 """A duty on a map: its points with their lives, the marks on the picture, files and JSON, and what is refused."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The page of measured figures: its commands name files and keys that exist."""
 
-from __future__ import annotations
-
 import shlex
 import tomllib
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The motion that goes into a report: light, and the motion that was computed."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A study shows the original first, and ends in a report where a limit cannot be met: the best point and all obstacles at once."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

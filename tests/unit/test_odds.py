@@ -1,7 +1,5 @@
 """The odds that a design keeps a limit while inputs are unknown."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy import special

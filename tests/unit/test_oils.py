@@ -1,7 +1,5 @@
 """Oils by grade and data sheet, what a scene makes of them, loads below the makers' minimum, cages without a land."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 
@@ -167,10 +165,7 @@ def test_unit_unknown_oils(text):
 @pytest.mark.parametrize(
     ("keys", "words"),
     [
-        (
-            {"oil": "MIL-L-7808", "base_oil": "PAO"},
-            "lubricant.base_oil = PAO: contradicts lubricant.oil = 'MIL-L-7808', which implies it",
-        ),
+        ({"oil": "MIL-L-7808", "base_oil": "PAO"}, "base_oil = PAO: contradicts lubricant.oil = 'MIL-L-7808', which"),
         ({"oil": "Mobil Jet Oil II", "density_kg_m3": 900.0}, "lubricant.density_kg_m3 = 900.0"),
         ({"viscosities_C_mm2_s": [[40.0, 32.0], [100.0, 5.4]]}, "which implies it; leave out one of them"),
         ({"oil": "data_sheet"}, "lubricant.density_kg_m3: missing"),

@@ -1,7 +1,5 @@
 """A figure, a loss or a clearance that is added to its one list appears in everything that names them."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys

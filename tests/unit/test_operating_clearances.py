@@ -1,7 +1,5 @@
 """Clearances of a cage in operation: formulas typed here next to the tool's, limits, signs, refusals, what dynamics gets."""
 
-from __future__ import annotations
-
 import math
 import tomllib
 from dataclasses import replace
@@ -181,10 +179,7 @@ def test_literature_bronze_and_peek_at_24000_rpm():
             {"cage": "peek"},
             ("cage.guide_clearance_mm = 0.15", "temperature -138.0 um", "leave -3.6 um", "land_film_floor_um = 3"),
         ),
-        (
-            {"cage": "peek", "cage__hoop_modulus_share": 1.0},
-            ("leave 1.9 um, not above twice model.land_film_floor_um",),
-        ),
+        ({"cage": "peek", "cage__hoop_modulus_share": 1.0}, ("leave 1.9 um, not above twice model.land_film_floor",)),
         ({"cage": "peek", "model__guide_land": "dry"}, ("leave -3.6 um: the cage seizes",)),
         (
             {

@@ -1,7 +1,5 @@
 """What a history tells: whirl, sections, spectra, loads around the bearing, on motions known in closed form."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

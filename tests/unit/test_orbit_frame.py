@@ -1,7 +1,5 @@
 """The frame that turns with the rollers: an exact change of variables that spares steps."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

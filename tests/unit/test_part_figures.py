@@ -1,7 +1,5 @@
 """Power terms, operating clearances, contact pressures and films as figures: of a result, a study, a limit and a map."""
 
-from __future__ import annotations
-
 import json
 import math
 from functools import cache

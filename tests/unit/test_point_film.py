@@ -1,7 +1,5 @@
 """Film of a ball on a race: exact derivative, published forms, limits."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Preload, clearance and wear: optima against a dense scan, closed forms, limits, notes."""
 
-from __future__ import annotations
-
 import importlib
 import math
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Roller profiles: closed forms, limits, and the pressure that Lundberg's profile is made for."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

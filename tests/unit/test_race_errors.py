@@ -1,7 +1,5 @@
 """Form errors of grooves and balls: signs, who carries them, what a seed draws, what a scene may hold."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

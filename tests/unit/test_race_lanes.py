@@ -1,7 +1,5 @@
 """Race contacts in vectors: which may share one, and how lanes choose their race."""
 
-from __future__ import annotations
-
 import tomllib
 
 import numpy as np

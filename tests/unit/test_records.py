@@ -1,7 +1,5 @@
 """Records: what stands where in their JSON form, what is read back and what is refused."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

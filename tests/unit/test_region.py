@@ -1,7 +1,5 @@
 """The region in which bearings run: floors of clearances, moved and narrowed regions, and studies whose runs fail."""
 
-from __future__ import annotations
-
 import shutil
 import tomllib
 from dataclasses import replace

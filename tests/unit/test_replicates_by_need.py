@@ -1,7 +1,5 @@
 """Design runs have few replicates at first, and all of them where noise would be much of what the surfaces predict."""
 
-from __future__ import annotations
-
 from collections import Counter
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Ring growth, fits and mounted clearance: closed forms, an independent solution of the rotating ring, limits."""
 
-from __future__ import annotations
-
 import copy
 import math
 from dataclasses import fields, replace

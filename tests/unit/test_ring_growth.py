@@ -1,7 +1,5 @@
 """Growth of ball races: printed form, limits, heat, fits and the speed at which a ring leaves its shaft."""
 
-from __future__ import annotations
-
 import math
 import tomllib
 from dataclasses import replace

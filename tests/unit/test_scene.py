@@ -1,7 +1,5 @@
 """A bad scene is refused with every fault at once, each naming file, key, value and mend."""
 
-from __future__ import annotations
-
 import copy
 import math
 import pydoc

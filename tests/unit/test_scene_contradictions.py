@@ -1,7 +1,5 @@
 """Contradictions between keys of a scene, of a schedule, a profile and errors of rollers among others: each a sentence."""
 
-from __future__ import annotations
-
 import copy
 
 import pytest

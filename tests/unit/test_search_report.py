@@ -1,7 +1,5 @@
 """What a report tells of a search in few runs: fronts on one scale, where runs were spent, what holds the selected design."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import replace
 from types import SimpleNamespace

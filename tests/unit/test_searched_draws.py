@@ -1,7 +1,5 @@
 """What a search leaves open about its pick: draws of its emulators at the level of its own runs."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 
 import numpy as np

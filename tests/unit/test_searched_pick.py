@@ -1,7 +1,5 @@
 """The selected design of the simulator's own front: what tolerances leave of it, and its limits."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

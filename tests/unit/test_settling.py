@@ -1,7 +1,5 @@
 """Runs that go on until they have settled: tests of drift, what slow change adds to an error, lengthening, coverage."""
 
-from __future__ import annotations
-
 import json
 import math
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """A whole simulation: determinism, seeds, records, error bars, and what the guidance does to the cage."""
 
-from __future__ import annotations
-
 import json
 import math
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Where a run starts: epicyclic speeds, static load share, seeded offsets."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

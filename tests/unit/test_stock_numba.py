@@ -1,7 +1,5 @@
 """numba changes its inner parts from release to release: what compiles kernels without them, and that the bits are the same."""
 
-from __future__ import annotations
-
 import logging
 import sys
 

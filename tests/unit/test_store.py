@@ -1,7 +1,5 @@
 """The store of runs: what it refuses, what survives a cut log and a full disk, who may work on it."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import socket
@@ -70,10 +68,7 @@ def foreign(path: Path, *statements: str) -> None:
     [
         ((), "it is not a database; move it away or name another folder"),
         (("CREATE TABLE birds (name TEXT)",), "not a store of runs"),
-        (
-            ("CREATE TABLE runs (key TEXT PRIMARY KEY, result TEXT)",),
-            "a store of version 1, not 2; move it away or name another folder",
-        ),
+        (("CREATE TABLE runs (key TEXT PRIMARY KEY, result TEXT)",), "a store of version 1, not 2; move it away"),
         (
             (
                 "CREATE TABLE meta (name TEXT, value TEXT)",

@@ -1,7 +1,5 @@
 """The whole study on a short simulation: results, resumption, determinism, failures."""
 
-from __future__ import annotations
-
 import json
 import os
 import re

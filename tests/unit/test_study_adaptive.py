@@ -1,7 +1,5 @@
 """The study that follows the front found in few runs: files, the same bits however it runs, faults, advice."""
 
-from __future__ import annotations
-
 import csv
 import sqlite3
 from dataclasses import replace

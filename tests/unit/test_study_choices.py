@@ -1,7 +1,5 @@
 """From the front to a confirmed choice: which points are simulated, whether gains are real, chains."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 
 import numpy as np

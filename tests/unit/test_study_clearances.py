@@ -1,7 +1,5 @@
 """Studies of a mounted bearing: drawn and operating clearances in the answer, the class of a pick, regions where a cage seizes."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

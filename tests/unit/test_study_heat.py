@@ -1,7 +1,5 @@
 """Studies of scenes with a heat balance: temperatures as responses and measurements, failed balances, hot scenes, the example."""
 
-from __future__ import annotations
-
 import json
 import shutil
 from dataclasses import replace

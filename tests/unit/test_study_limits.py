@@ -1,7 +1,5 @@
 """A study never calls a broken limit a success: verdicts by simulation, tries, exit codes, the edge of the region."""
 
-from __future__ import annotations
-
 import json
 import re
 from types import SimpleNamespace

@@ -3,8 +3,6 @@
 The simulations take no time here; the same with real ones stands in ``test_study``.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import re

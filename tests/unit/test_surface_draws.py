@@ -1,7 +1,5 @@
 """Drawn surfaces, and what they leave open of the share of parts that keep a promise."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -261,10 +261,7 @@ def test_blocks_are_told_and_left_out_of_the_surface():
     [
         ({"transform": 0.5}, 'value of run 3 is -2, but a power transform .* use transform = "none"'),
         ({"transform": "box_cox"}, "run 3 is -2"),
-        (
-            {"block": np.arange(20) % 11},
-            "20 runs are too few .* at least 21, one more than its terms and block effects",
-        ),
+        ({"block": np.arange(20) % 11}, "20 runs are too few .* at least 21, one more than its terms and block"),
         ({"block": (POINTS[:, 0] > 0).astype(int), "model": "linear"}, None),
         ({"block": np.r_[np.zeros(14, int), np.ones(6, int)]}, None),
     ],

@@ -1,7 +1,5 @@
 """What surrounds the bearing: schedules, drive and rotating loads, support, weight, an unbalanced cage."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Tables as spreadsheets of several countries write them: the same numbers, or a sentence; never other numbers."""
 
-from __future__ import annotations
-
 import csv
 import datetime
 import io

@@ -1,7 +1,5 @@
 """What a run to a target accuracy costs: pilots and earlier runs of its loop count."""
 
-from __future__ import annotations
-
 import time
 
 import pytest

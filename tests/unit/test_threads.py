@@ -1,7 +1,5 @@
 """Bits do not depend on how many threads linear algebra has."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from conftest import ROOT

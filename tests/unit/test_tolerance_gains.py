@@ -1,7 +1,5 @@
 """The gains that tolerances keep, the grades of their parts, and what a gain demands."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import replace
 

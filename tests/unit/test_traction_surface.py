@@ -1,7 +1,5 @@
 """Traction from a table over slip and load, mixed friction, and what a scene makes of both."""
 
-from __future__ import annotations
-
 import copy
 import math
 

@@ -1,7 +1,5 @@
 """Values with their errors: one rule of rounding, wherever a person reads them."""
 
-from __future__ import annotations
-
 import math
 import re
 from decimal import Decimal

@@ -1,7 +1,5 @@
 """Verdict on cages of bearings by `rbdyn simulate`: known answers of the example at 24 000 rpm."""
 
-from __future__ import annotations
-
 import json
 from functools import cache
 

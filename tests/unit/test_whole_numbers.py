@@ -1,7 +1,5 @@
 """Factors that are whole numbers, which have no tolerance."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from test_study_adaptive import ROLLERS, with_rollers
