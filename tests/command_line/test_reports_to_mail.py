@@ -25,32 +25,16 @@ SHORT = ("--turns", "2", "--replicates", "1", "--set", "numerics.companion=false
 # Each command with its tables, the bearing and a word of its point.
 COMMANDS = {
     "simulate": (("rbdyn", "simulate", ROLLERS, *SHORT), {"figures.csv", "history.csv"}, "1300 N radial"),
-    "map": (
-        ("rbdyn", "map", ROLLERS, "--speed", "20000,24000", "--load", "900", *SHORT),
-        {"map.csv"},
-        "inner speed 20000 to 24000 rpm",
-    ),
+    "map": (("rbdyn", "map", ROLLERS, "--speed", "20000,24000", "--load", "900", *SHORT), {"map.csv"}, "inner speed 20000 to 24000 rpm"),
     "ball": (("rbdyn", "ball", BALLS), {"balls.csv"}, "200 N radial, 200 N axial"),
-    "sweep": (
-        ("rbdyn", "ball", BALLS, "--sweep", "operation.axial_load_N=100:300:3"),
-        {"sweep.csv"},
-        "axial load 100 to 300 N",
-    ),
+    "sweep": (("rbdyn", "ball", BALLS, "--sweep", "operation.axial_load_N=100:300:3"), {"sweep.csv"}, "axial load 100 to 300 N"),
     "preload": (("rbdyn", "ball", BALLS, "--preload", "50,75,100"), {"preload.csv"}, "preload 50 to 100 N"),
-    "race limits": (
-        ("rbdyn", "ball", SEVENTY, "--set", "bearing.bore_mm=70", "--race-limits", "P4"),
-        {"race_limits.csv"},
-        "500 N axial",
-    ),
+    "race limits": (("rbdyn", "ball", SEVENTY, "--set", "bearing.bore_mm=70", "--race-limits", "P4"), {"race_limits.csv"}, "500 N axial"),
     "design": (("doe", "design", STUDY), {"design.csv"}, "1300 N radial"),
     "fit": (("doe", "fit", STUDY, "--data", RUNS), {"anova.csv", "coefficients.csv", "runs.csv"}, "1300 N radial"),
     "front": (("doe", "front", STUDY, "--data", RUNS), {"front.csv"}, "1300 N radial"),
-    "chain": (
-        ("doe", "chain", EXAMPLES / "pocket_chain.toml"),
-        {"part_dimensions.csv", "contributions.csv"},
-        "pocket_chain.toml",
-    ),
-}
+    "chain": (("doe", "chain", EXAMPLES / "pocket_chain.toml"), {"part_dimensions.csv", "contributions.csv"}, "pocket_chain.toml"),
+}  # fmt: skip
 # These take seconds.
 SLOW = ("race limits", "front")
 

@@ -30,10 +30,7 @@ LARGE = {
         "kind": "angular_contact_ball", "balls": 16, "ball_diameter_mm": 22.225, "pitch_diameter_mm": 125.26,
         "contact_angle_deg": 40.0, "inner_groove_factor": 0.5232, "outer_groove_factor": 0.5232,
     },
-    "operation": {
-        "inner_speed_rpm": 10000.0, "load_N": [6000.0, -1500.0, 15000.0], "moment_Nm": [90.0, -140.0],
-        "tilt": "free",
-    },
+    "operation": {"inner_speed_rpm": 10000.0, "load_N": [6000.0, -1500.0, 15000.0], "moment_Nm": [90.0, -140.0], "tilt": "free"},
     "model": {"raceway_control": "hybrid"},
 }  # fmt: skip
 # 209 with clearance, both rings turning, under a load that leaves balls unloaded.

@@ -95,10 +95,6 @@ class Known:
 
 
 KNOWN = {
-    "flip": Known(_flip, 3, 0.05),
-    "two": Known(_two, 6, 0.1),
-    "equal": Known(_equal, 6, 0.1),
-    "pair": Known(_pair, 4, 0.02),
-    "never": Known(_never, 4, 0.02),
-    "rig": Known(_rig, 12, 0.1),
-}
+    "flip": Known(_flip, 3, 0.05), "two": Known(_two, 6, 0.1), "equal": Known(_equal, 6, 0.1),
+    "pair": Known(_pair, 4, 0.02), "never": Known(_never, 4, 0.02), "rig": Known(_rig, 12, 0.1),
+}  # fmt: skip

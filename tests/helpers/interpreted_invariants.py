@@ -42,12 +42,7 @@ SCHEDULE = (
 SUPPORT = ("support.stiffness_N_m=3e7", "support.damping_N_s_m=3e3")
 # One choice of each line makes a scene. Guidance is chosen with what goes with it.
 CHOICES = (
-    (
-        (),
-        ("cage.guidance=inner",),
-        ("model.guide_land=dry",),
-        ("cage.guidance=roller", "cage.pocket_radial_clearance_mm=0.06"),
-    ),
+    ((), ("cage.guidance=inner",), ("model.guide_land=dry",), ("cage.guidance=roller", "cage.pocket_radial_clearance_mm=0.06")),
     ((), ("operation.outer_speed_rpm=9000.0",), ("operation.outer_speed_rpm=-24000.0",)),
     ((), ("operation.rotating_load_N=300.0", "operation.unbalance_g_mm=5.0"), SCHEDULE),
     ((), ("operation.gravity_m_s2=50.0", "operation.gravity_direction_deg=60.0")),
@@ -62,7 +57,7 @@ CHOICES = (
     (("model.pocket_restitution=0.6",), ("model.pocket_bar_stiffness_N_m=rigid",)),
     ((), ("traction.friction=mixed",), ("traction.mu_0=0.02",), ("traction.model=coulomb",)),
     ((), ("model.drag=off",)),
-)
+)  # fmt: skip
 
 
 @st.composite

@@ -9,18 +9,13 @@ from rbdyn.scene import Scene
 
 TABLE = {
     "bearing": {
-        "kind": "cylindrical_roller",
-        "rollers": 10,
-        "roller_diameter_mm": 9.0,
-        "roller_length_mm": 5.0,
-        "effective_length_mm": 3.5,
-        "pitch_diameter_mm": 43.5,
-        "radial_clearance_mm": 0.020,
+        "kind": "cylindrical_roller", "rollers": 10, "roller_diameter_mm": 9.0, "roller_length_mm": 5.0,
+        "effective_length_mm": 3.5, "pitch_diameter_mm": 43.5, "radial_clearance_mm": 0.020,
     },
     "cage": {"guidance": "outer", "guide_clearance_mm": 0.15, "pocket_clearance_mm": 0.30, "mass_g": 45.0},
     "lubricant": {"oil": "MIL-L-7808", "temperature_C": 100.0},
     "operation": {"inner_speed_rpm": 24000.0, "radial_load_N": 1300.0},
-}
+}  # fmt: skip
 
 
 def faults_of(*assignments, changes=None):

@@ -20,15 +20,9 @@ COEFFICIENTS: dict[str, dict[str, float]] = {
 }
 VERDICT = {"percent": 11.16, "error_percent": 0.65, "goal": "min", "verdict": "better"}
 NOTHING_MISSED = {
-    "reachable": True,
-    "limits": [],
-    "at_bounds": [],
-    "beyond": [],
-    "chains": {},
-    "tolerances": "",
-    "cage": {},
+    "reachable": True, "limits": [], "at_bounds": [], "beyond": [], "chains": {}, "tolerances": "", "cage": {},
     "sentences": [],
-}
+}  # fmt: skip
 
 
 def predicted(response: str, coded: list[float]) -> float:

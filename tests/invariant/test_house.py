@@ -33,19 +33,9 @@ LONGEST_FILE, LONGEST_FUNCTION, MOST_AT_THE_ROOT = 600, 70, 6
 # how much in the commit.
 MOST_CODE = 48_656
 TOP = {
-    ".ci",
-    ".gitignore",
-    "CHANGELOG.md",
-    "CITATION.cff",
-    "CONTRIBUTING.md",
-    "LICENSE",
-    "README.md",
-    "doe",
-    "examples",
-    "pyproject.toml",
-    "rbdyn",
-    "tests",
-}
+    ".ci", ".gitignore", "CHANGELOG.md", "CITATION.cff", "CONTRIBUTING.md", "LICENSE", "README.md", "doe",
+    "examples", "pyproject.toml", "rbdyn", "tests",
+}  # fmt: skip
 NOT_SI = re.compile(r"_(mm|mm2|um|mm_um|g|g_mm|rpm|deg|mrad|MPa|GPa)$")
 KERNEL = re.compile(r"kernel|routine|entry|law_of\(|.*\.body\(|compiled_as\(")
 # Where a drawing's own units may be read: what speaks to people, what makes scenes of scenes, and saved records.

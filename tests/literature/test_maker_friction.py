@@ -30,13 +30,9 @@ BEARINGS = [
 ]  # fmt: skip
 RPM = math.pi / 30.0
 KEYS = {
-    "skf_power_W",
-    "skf_rolling_moment_N_mm",
-    "skf_sliding_moment_N_mm",
-    "iso_15312_heat_W",
-    "ratio",
+    "skf_power_W", "skf_rolling_moment_N_mm", "skf_sliding_moment_N_mm", "iso_15312_heat_W", "ratio",
     "skf_starvation_factor",
-}
+}  # fmt: skip
 NAMES = [f"NU {each[0]}" for each in BEARINGS]
 
 

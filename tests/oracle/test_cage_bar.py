@@ -26,19 +26,8 @@ from rbdyn.scene.bearing import STIFFNESS_ERROR
 
 BRASS, POLYAMIDE = Elastic(105e9, 0.34), Elastic(5e9, 0.35)
 SIZES = [
-    "NU204",
-    "NU208",
-    "NU210",
-    "NU215",
-    "NU220",
-    "NU308",
-    "NU314",
-    "NU1010",
-    "NU1020",
-    "NU2210",
-    "NU2220",
-    "NU2306",
-]
+    "NU204", "NU208", "NU210", "NU215", "NU220", "NU308", "NU314", "NU1010", "NU1020", "NU2210", "NU2220", "NU2306",
+]  # fmt: skip
 CLAMPED = np.zeros((2, 2))
 # What the docstring states of the law.
 LAW_ERROR = 0.2

@@ -25,35 +25,19 @@ TWIN = 1e-10
 # coefficient stays constant: in a state whose outer contacts are all so light, their small powers are off by a
 # hundredth.
 TABLE = {
-    "roller acceleration": 1e-5,
-    "roller spin rate": 2e-4,
-    "ring acceleration": 1e-5,
-    "support acceleration": 1e-5,
-    "outer_race_traction": 2e-2,
-    "inner_race_traction": 2e-4,
-    "shaft": 2e-4,
-}
+    "roller acceleration": 1e-5, "roller spin rate": 2e-4, "ring acceleration": 1e-5, "support acceleration": 1e-5,
+    "outer_race_traction": 2e-2, "inner_race_traction": 2e-4, "shaft": 2e-4,
+}  # fmt: skip
 # The film's polynomials are within 2e-5 of its push, 9e-5 of its rolling force and 3e-3 of its shear.
 FILM = {
-    "roller acceleration": 1e-5,
-    "roller spin rate": 1e-3,
-    "cage acceleration": 1e-3,
-    "cage spin rate": 1e-3,
-    "pocket_film": 5e-3,
-    "wall": 5e-5,
-    "pocket_force": 5e-5,
-    "pocket_squeeze": 5e-5,
-}
+    "roller acceleration": 1e-5, "roller spin rate": 1e-3, "cage acceleration": 1e-3, "cage spin rate": 1e-3,
+    "pocket_film": 5e-3, "wall": 5e-5, "pocket_force": 5e-5, "pocket_squeeze": 5e-5,
+}  # fmt: skip
 # The polynomials of a film that a layer feeds are within 1e-5 of the flooded one; its layer within the round-off of static loads.
 LAYER = {
-    "roller acceleration": 1e-7,
-    "roller spin rate": 1e-5,
-    "ring acceleration": 1e-9,
-    "inner_race_traction": 1e-5,
-    "rolling_resistance": 1e-5,
-    "inner_rolling": 1e-4,
-    "shaft": 1e-5,
-}
+    "roller acceleration": 1e-7, "roller spin rate": 1e-5, "ring acceleration": 1e-9, "inner_race_traction": 1e-5,
+    "rolling_resistance": 1e-5, "inner_rolling": 1e-4, "shaft": 1e-5,
+}  # fmt: skip
 SEEDS = range(60)
 
 # Compiled: between them every body of every law that the race contacts hold.
@@ -137,11 +121,7 @@ MEETINGS = {
         "mounting.inner_interference_um=12.0",
         "model.land_fill=0.4",
     ),
-    "starved inlets, open films": (
-        "lubricant.inlet_distance=3.0",
-        "model.rolling_resistance_factor=0.8",
-        "model.open_contact_film=true",
-    ),
+    "starved inlets, open films": ("lubricant.inlet_distance=3.0", "model.rolling_resistance_factor=0.8", "model.open_contact_film=true"),
     "tangential elasticity, clock": (
         "traction.elasticity=true",
         "model.open_contact_film=true",
@@ -150,7 +130,7 @@ MEETINGS = {
         *SUPPORT,
     ),
     "rotating load": ("operation.rotating_load_N=700.0", "operation.radial_load_N=100.0"),
-}
+}  # fmt: skip
 TABLES = {
     "Eyring": ("traction.model=eyring", "lubricant.pressure_coefficient_1_GPa=9.0"),
     "limiting shear, starved": ("traction.model=limiting_shear", "lubricant.inlet_distance=10.0"),

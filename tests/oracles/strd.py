@@ -173,11 +173,7 @@ REFERENCES = {
     "Wampler 1": wampler(0, Fraction(1), "0 0 0 0 0 0", "0", "1", None),
     "Wampler 2": wampler(0, Fraction(1, 10), "0 0 0 0 0 0", "0", "1", None),
     "Wampler 3": wampler(1, Fraction(1), WAMPLER_3_ERRORS, "2360.14502379268", "0.999995559025820", "675524.458240122"),
-    "Wampler 4": wampler(
-        100, Fraction(1), WAMPLER_4_ERRORS, "236014.502379268", "0.957478440825662", "67.5524458240122"
-    ),
-    "Wampler 5": wampler(
-        10000, Fraction(1), WAMPLER_5_ERRORS, "23601450.2379268", "0.00224668921574940", "0.00675524458240122"
-    ),
+    "Wampler 4": wampler(100, Fraction(1), WAMPLER_4_ERRORS, "236014.502379268", "0.957478440825662", "67.5524458240122"),
+    "Wampler 5": wampler(10000, Fraction(1), WAMPLER_5_ERRORS, "23601450.2379268", "0.00224668921574940", "0.00675524458240122"),
     "Filip": filip(),
-}
+}  # fmt: skip

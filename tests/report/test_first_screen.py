@@ -31,14 +31,9 @@ from rbdyn.base.records import plain
 from rbdyn.cli.app import app
 
 ORDER = (
-    "made-up bearing",
-    "Selected clearances",
-    "Limits judged",
-    "Changes confirmed",
-    "Parts to make",
-    "Why this point",
-    "note: ",
-)
+    "made-up bearing", "Selected clearances", "Limits judged", "Changes confirmed", "Parts to make",
+    "Why this point", "note: ",
+)  # fmt: skip
 
 
 def limited(verdict: str = "kept", odds: list[float] | None = None) -> dict:
@@ -103,13 +98,9 @@ def test_a_limit_has_its_odds_or_the_command_for_them():
     [
         (limited(), "The selected design meets every limit.", "statement"),
         (limited(odds=[0.57, 0.51, 0.63]), "The selected design does not meet every limit over", "warning"),
-        (
-            limited(odds=[0.97, 0.93, 0.99]),
-            "The selected design meets every limit and over the unknown inputs.",
-            "statement",
-        ),
+        (limited(odds=[0.97, 0.93, 0.99]), "The selected design meets every limit and over the unknown inputs.", "statement"),
     ],
-)
+)  # fmt: skip
 def test_a_limit_is_good_news_only_where_it_is_kept_over_the_unknown_inputs_too(record, words, role):
     (judged,) = [role for text, role in roles(record).items() if text.startswith(words)]
     assert judged == role

@@ -45,34 +45,12 @@ SERIES = {"NU": ("10", "2", "22", "3", "23"), "NJ": ("2", "3"), "N": ("10", "2")
 CODES = (*(f"{code:02d}" for code in range(0, 30)), "99", "5", "")
 LIKELY = {"--speed": (1.0, 20000.0), "--load": (1.0, 1e5), "--preload": (1.0, 5000.0), "--temperature": (-20.0, 150.0)}
 EXTREMES = (
-    "0",
-    "-1",
-    "nan",
-    "inf",
-    "-inf",
-    "1e400",
-    "1e300",
-    "1e-300",
-    "-300",
-    "343",
-    "1e7",
-    "0.001",
-    "1",
-    "2000",
-    "x",
-    "",
-)
+    "0", "-1", "nan", "inf", "-inf", "1e400", "1e300", "1e-300", "-300", "343", "1e7", "0.001", "1", "2000", "x", "",
+)  # fmt: skip
 OILS = (
-    "ISO VG 32",
-    "VG 15 PAO",
-    "grease VG 100",
-    "23699",
-    "Jet Oil II",
-    "VG 0",
-    "VG 99999",
-    "castor",
+    "ISO VG 32", "VG 15 PAO", "grease VG 100", "23699", "Jet Oil II", "VG 0", "VG 99999", "castor",
     "ISO VG " + "9" * 5000,
-)
+)  # fmt: skip
 KEYS = {"--speed": "inner_speed_rpm", "--load": "radial_load_N", "--preload": "preload_N"}
 
 

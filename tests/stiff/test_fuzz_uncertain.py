@@ -44,12 +44,8 @@ SETS = (
     "model.pocket_film=true", "cage.guide_clearance_mm=0.2",
 )  # fmt: skip
 ESTIMATED = (
-    "cage.mass_g",
-    "lubricant.temperature_C",
-    "model.land_fill",
-    "traction.model",
-    "lubricant.roller_roughness_um",
-)
+    "cage.mass_g", "lubricant.temperature_C", "model.land_fill", "traction.model", "lubricant.roller_roughness_um",
+)  # fmt: skip
 EXTREMES = [
     0, 0.0, -1.0, 1e300, -1e300, 1e308, math.nan, math.inf, 1e-300, 5e-324, 1e12, 1e-12, -1e12, True, "x", "", [], {}, None,
     10**18, "cage.mass_g", [1.0, 2.0], "é\n", "a" * 3000,

@@ -29,18 +29,11 @@ def tolerance_rows(sizes, error, gaps=(1e-2, 1e-4, 1e-5, 1e-7)):
 @pytest.mark.parametrize(
     ("value", "error", "verdict"),
     [
-        (0.002, 0.001, "within"),
-        (-0.009, 0.01, "within"),
-        (0.011, 0.009, "beyond"),
-        (-0.2, 0.05, "beyond"),
-        (0.03, 0.05, "undecided"),
-        (0.0, 0.02, "undecided"),
-        (0.0, math.nan, "undecided"),
-        (0.5, math.nan, "undecided"),
-        (math.nan, 0.001, "undecided"),
-        (0.5, math.inf, "undecided"),
+        (0.002, 0.001, "within"), (-0.009, 0.01, "within"), (0.011, 0.009, "beyond"), (-0.2, 0.05, "beyond"),
+        (0.03, 0.05, "undecided"), (0.0, 0.02, "undecided"), (0.0, math.nan, "undecided"),
+        (0.5, math.nan, "undecided"), (math.nan, 0.001, "undecided"), (0.5, math.inf, "undecided"),
     ],
-)
+)  # fmt: skip
 def test_unit_judged(value, error, verdict):
     """Unit: an error above what is sought decides only what stands out of it."""
     assert judged(value, error, 0.01) == judged(-value, error, 0.01) == verdict

@@ -115,13 +115,10 @@ def test_oracle_the_schur_complement_is_the_rings_stiffness(problem, ours):
 @pytest.mark.parametrize(
     "solver",
     [
-        plain_newton,
-        finite_search.solve,
-        minpack.SOLVERS["MINPACK hybrid"],
-        minpack.SOLVERS["MINPACK LM"],
+        plain_newton, finite_search.solve, minpack.SOLVERS["MINPACK hybrid"], minpack.SOLVERS["MINPACK LM"],
         full_system.convex_with_limit,
     ],
-)
+)  # fmt: skip
 def test_oracle_all_solvers_find_the_same_equilibrium(solver):
     """At a load where each of them converges."""
     problem = problem_of(Scene.load(BALLS, ["operation.axial_load_N=2000", "operation.inner_speed_rpm=5000"]))

@@ -19,14 +19,11 @@ def scene_with(*assignments, file="angular_contact_ball.toml"):
     ("scene", "keys"),
     [
         (scene_with(), {SPEED: np.linspace(5e3, 30e3, 40).tolist()}),
-        (
-            scene_with("model.solver=finite_search"),
-            {SPEED: np.linspace(5e3, 9e3, 12).tolist(), "bearing.balls": [15, 16]},
-        ),
+        (scene_with("model.solver=finite_search"), {SPEED: np.linspace(5e3, 9e3, 12).tolist(), "bearing.balls": [15, 16]}),
         (scene_with(file="double_decker.toml"), {LOAD: np.linspace(200.0, 900.0, 6).tolist()}),
     ],
     ids=["a single row", "another solver", "double-decker"],
-)
+)  # fmt: skip
 def test_an_interrupted_sweep_goes_on_to_the_same_bits(scene, keys, tmp_path, monkeypatch):
     """Unit: stopped by Ctrl-C, what is done is kept; the rest alone is solved, and no figure differs."""
     monkeypatch.setattr(sweeps, "ROW", 2)

@@ -19,12 +19,9 @@ from rbdyn.scene.keys import default_of
 EXAMPLES = Path(__file__).parents[2] / "examples"
 ROLLERS, BALLS = EXAMPLES / "cylindrical_roller.toml", EXAMPLES / "angular_contact_ball.toml"
 FIGURES = {
-    "impact_force_N": 90.0,
-    "whirl_deviation_ratio": 0.4,
-    "power_loss_W": 240.0,
-    "cage_speed_rpm": 9400.0,
+    "impact_force_N": 90.0, "whirl_deviation_ratio": 0.4, "power_loss_W": 240.0, "cage_speed_rpm": 9400.0,
     "cage_slip": 0.01,
-}
+}  # fmt: skip
 PAIRS = 200
 
 

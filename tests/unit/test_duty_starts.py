@@ -15,13 +15,9 @@ from rbdyn.scene.thermal import point_before
 
 # Simulations of the heat alone: runs five times as long move no clearance by more than 0.03 um.
 QUICK = {
-    "turns": 2.0,
-    "discard_turns": 1.0,
-    "impact_window_turns": 1.0,
-    "replicates": 2,
-    "extend": False,
+    "turns": 2.0, "discard_turns": 1.0, "impact_window_turns": 1.0, "replicates": 2, "extend": False,
     "companion": False,
-}
+}  # fmt: skip
 
 
 @pytest.fixture(scope="module")

@@ -85,12 +85,9 @@ KERNELS_OF_OPTIONS = (
 )  # fmt: skip
 # Numbers that an option adds to the state: a ring's place and velocity, or time and two angles, or two coefficients a roller.
 STATE = {
-    "tangential elasticity": 20,
-    "outer ring on a support": 4,
-    "wavy inner race, with clock": 3,
-    "rotating load, with clock": 3,
-    "speed and load by schedule": 3,
-}
+    "tangential elasticity": 20, "outer ring on a support": 4, "wavy inner race, with clock": 3,
+    "rotating load, with clock": 3, "speed and load by schedule": 3,
+}  # fmt: skip
 # Modules that an option loads and the plain scene does not.
 CLOCK = ("rbdyn.dynamics.forces.schedule",)
 SLICES = ("rbdyn.contact.profile", "rbdyn.dynamics.forces.observe")

@@ -171,18 +171,12 @@ def test_unit_unknown_oils(text):
         ({"oil": "data_sheet"}, "lubricant.density_kg_m3: missing"),
         ({"oil": "data_sheet"}, "lubricant.viscosities_C_mm2_s: missing"),
         ({"oil": "data_sheet", "viscosity_index": 95.0}, "lubricant.viscosity_index = 95.0: contradicts lubricant.oil"),
-        (
-            {"oil": "data_sheet", "viscosities_C_mm2_s": [[40.0, 5.0], [100.0, 32.0]], "density_kg_m3": 880.0},
-            "must fall",
-        ),
-        (
-            {"oil": "data_sheet", "viscosities_C_mm2_s": [[40.0, 5.0, 1.0], [100.0]], "density_kg_m3": 880.0},
-            "each point",
-        ),
+        ({"oil": "data_sheet", "viscosities_C_mm2_s": [[40.0, 5.0], [100.0, 32.0]], "density_kg_m3": 880.0}, "must fall"),
+        ({"oil": "data_sheet", "viscosities_C_mm2_s": [[40.0, 5.0, 1.0], [100.0]], "density_kg_m3": 880.0}, "each point"),
         ({"oil": "ISO VG 33"}, "choose one of"),
         ({"viscosity_index": float("nan")}, "is not a finite number"),
     ],
-)
+)  # fmt: skip
 def test_unit_faults_of_an_oil(keys, words, make_scene):
     """Unit: an oil that contradicts itself or lacks something is refused in a sentence that names key and mend."""
     data = make_scene().model_dump(mode="json", exclude={"traction"})

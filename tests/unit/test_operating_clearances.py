@@ -175,10 +175,7 @@ def test_literature_bronze_and_peek_at_24000_rpm():
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        (
-            {"cage": "peek"},
-            ("cage.guide_clearance_mm = 0.15", "temperature -138.0 um", "leave -3.6 um", "land_film_floor_um = 3"),
-        ),
+        ({"cage": "peek"}, ("cage.guide_clearance_mm = 0.15", "temperature -138.0 um", "leave -3.6 um", "land_film_floor_um = 3")),
         ({"cage": "peek", "cage__hoop_modulus_share": 1.0}, ("leave 1.9 um, not above twice model.land_film_floor",)),
         ({"cage": "peek", "model__guide_land": "dry"}, ("leave -3.6 um: the cage seizes",)),
         (
@@ -203,7 +200,7 @@ def test_literature_bronze_and_peek_at_24000_rpm():
             ("cage.pocket_radial_clearance_mm = 0.08: the pocket circle grows", "relative to the roller circle"),
         ),
     ],
-)
+)  # fmt: skip
 def test_unit_a_cage_that_seizes_is_refused(changes, words):
     """Unit: a clearance at or below the floor of its film, or at nothing without one, is one sentence with the figures."""
     with pytest.raises(InputError) as refused:

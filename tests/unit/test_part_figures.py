@@ -26,14 +26,9 @@ from rbdyn.scene import Scene
 
 SHORT = ["numerics.turns=2", "numerics.replicates=3"]
 ONE_OF_EACH = (
-    "land_film_power_W",
-    "guide_operating_clearance_um",
-    "outer_max_pressure_MPa",
-    "inner_minimum_film_um",
-    "life_h",
-    "stiffness_yy_N_um",
-    "variable_compliance_um",
-)
+    "land_film_power_W", "guide_operating_clearance_um", "outer_max_pressure_MPa", "inner_minimum_film_um", "life_h",
+    "stiffness_yy_N_um", "variable_compliance_um",
+)  # fmt: skip
 
 
 @cache

@@ -36,10 +36,7 @@ ADDED_FAULTS = {
         ("bearing.profile_table_mm_um", "each point is [position in mm, drop in um]"),
     ),
     "table without its points": (PROFILED, ("bearing.profile_table_mm_um: missing", "'table' needs it")),
-    "crown without its radius": (
-        {"bearing.roller_profile": "crowned"},
-        ("bearing.crown_radius_mm: missing", "'crowned' needs it"),
-    ),
+    "crown without its radius": ({"bearing.roller_profile": "crowned"}, ("bearing.crown_radius_mm: missing", "'crowned' needs it")),
     "crown smaller than the roller": (
         {"bearing.roller_profile": "crowned", "bearing.crown_radius_mm": 2.0},
         ("bearing.crown_radius_mm = 2", "above 2.5 mm", "enlarge it"),
@@ -98,10 +95,7 @@ ADDED_FAULTS = {
         {"cage.pocket_contact_length_mm": 5.5},
         ("cage.pocket_contact_length_mm = 5.5", "longer than the roller of 5 mm", "shorten it"),
     ),
-    "pocket contact of no length": (
-        {"cage.pocket_contact_length_mm": 0.0},
-        ("cage.pocket_contact_length_mm = 0.0", "greater than 0"),
-    ),
+    "pocket contact of no length": ({"cage.pocket_contact_length_mm": 0.0}, ("cage.pocket_contact_length_mm = 0.0", "greater than 0")),
     "times that do not rise": (
         {"operation.schedule": {**SCHEDULE, "time_s": [1.0, 0.5]}},
         ("operation.schedule.time_s", "0.5 s (point 2) follows 1 s", "sort them"),
@@ -127,7 +121,7 @@ ADDED_FAULTS = {
         {"support.stiffness_N_m": 0.0, "support.damping_N_s_m": 0.0},
         ("support.stiffness_N_m = 0.0", "greater than 0"),
     ),
-}
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("name", ADDED_FAULTS)

@@ -64,13 +64,10 @@ def test_a_page_has_the_result_before_the_hashes(result, tmp_path):
 @pytest.mark.parametrize(
     ("value", "digits", "words"),
     [
-        (3027392.3, 4, "3027000"),
-        (3027392.3, 2, "3000000"),
-        (72.8579, 4, "72.86"),
-        (1234567.0, 7, "1234567"),
+        (3027392.3, 4, "3027000"), (3027392.3, 2, "3000000"), (72.8579, 4, "72.86"), (1234567.0, 7, "1234567"),
         (1e9, 3, "1e+09"),
     ],
-)
+)  # fmt: skip
 def test_unit_a_number_has_no_more_digits_than_asked_for(value, digits, words):
     """Unit: also where it is written without an exponent."""
     assert shown(value, digits) == words

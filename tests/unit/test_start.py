@@ -33,13 +33,9 @@ from rbdyn.thermal.start import ROUGHNESS, WARMING_NODES
 
 # Simulations of the heat alone: runs five times as long tell the same of a start.
 QUICK = {
-    "turns": 4.0,
-    "discard_turns": 2.0,
-    "impact_window_turns": 2.0,
-    "replicates": 2,
-    "extend": False,
+    "turns": 4.0, "discard_turns": 2.0, "impact_window_turns": 2.0, "replicates": 2, "extend": False,
     "companion": False,
-}
+}  # fmt: skip
 
 
 @cache

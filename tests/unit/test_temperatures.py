@@ -22,21 +22,14 @@ from rbdyn.thermal.fixed_point import State
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 SHORT = {
-    "turns": 6.0,
-    "discard_turns": 3.0,
-    "replicates": 2,
-    "extend": False,
-    "companion": True,
+    "turns": 6.0, "discard_turns": 3.0, "replicates": 2, "extend": False, "companion": True,
     "impact_window_turns": 3.0,
-}
+}  # fmt: skip
 SHORTER = {**SHORT, "turns": 4.0, "discard_turns": 2.0, "impact_window_turns": 2.0, "companion": False}
 MOUNTING = {
-    "bore_mm": 27.0,
-    "outside_diameter_mm": 60.0,
-    "width_mm": 16.0,
-    "housing_diameter_mm": 90.0,
+    "bore_mm": 27.0, "outside_diameter_mm": 60.0, "width_mm": 16.0, "housing_diameter_mm": 90.0,
     "inner_interference_um": 10.0,
-}
+}  # fmt: skip
 FLOW = {"oil": "MIL-L-7808", "oil_flow_l_min": 1.0, "oil_inlet_temperature_C": 80.0}
 
 

@@ -288,14 +288,10 @@ def test_bad_declarations(laws: dict[str, Any], sentence: str) -> None:
     ("laws", "fixed", "sentence"),
     [
         ({"cage.mass_g": {"law": "uniform", "low": 1.0, "high": 2.0}}, {"cage.mass_g": "a factor"}, "is a factor too"),
-        (
-            {"cage.mass_g": {"law": "uniform", "low": 1.0, "high": 2.0, "times": "cage.guidance"}},
-            {},
-            "has no number there",
-        ),
+        ({"cage.mass_g": {"law": "uniform", "low": 1.0, "high": 2.0, "times": "cage.guidance"}}, {}, "has no number there"),
         ({"estimated": ["cage.guidance"]}, {}, '"cage.guidance" has no documented range'),
     ],
-)
+)  # fmt: skip
 def test_keys_that_cannot_vary(laws: dict[str, Any], fixed: dict[str, str], sentence: str) -> None:
     data = read_toml(SCENE)
     with pytest.raises(InputError) as refused:

@@ -36,13 +36,10 @@ def test_a_cage_at_rest_is_held():
 @pytest.mark.parametrize(
     ("rate", "orders", "name"),
     [
-        (0.47, (1,), "circling"),
-        (-0.1, (1,), "circling"),
-        (2.57, (1,), "fast whirl"),
-        (2.57, (1, 2.6), "circling"),
+        (0.47, (1,), "circling"), (-0.1, (1,), "circling"), (2.57, (1,), "fast whirl"), (2.57, (1, 2.6), "circling"),
         (-3, (1,), "fast whirl"),
     ],
-)
+)  # fmt: skip
 def test_a_steady_circle_has_its_rate(rate, orders, name):
     orbit = orbit_measures(0.8 * PLAY * np.exp(2j * np.pi * rate * TURNS), PLAY)
     assert orbit.radius == pytest.approx(0.8, rel=0.1)

@@ -14,17 +14,11 @@ from rbdyn.scene import Scene
 @pytest.mark.parametrize(
     ("number", "noun", "words"),
     [
-        (0, "note", "0 notes"),
-        (1, "note", "1 note"),
-        (2, "note", "2 notes"),
-        (1.0, "turn", "1 turn"),
-        (1.5, "turn", "1.5 turns"),
-        (1, "class", "1 class"),
-        (3, "class", "3 classes"),
-        (12345678, "run", "12345678 runs"),
-        (1234567, "point", "1234567 points"),
+        (0, "note", "0 notes"), (1, "note", "1 note"), (2, "note", "2 notes"), (1.0, "turn", "1 turn"),
+        (1.5, "turn", "1.5 turns"), (1, "class", "1 class"), (3, "class", "3 classes"),
+        (12345678, "run", "12345678 runs"), (1234567, "point", "1234567 points"),
     ],
-)
+)  # fmt: skip
 def test_unit_number_of_things_has_its_plural(number, noun, words):
     """Unit: one thing stands in the singular, all other numbers of them in the plural, whole numbers in full."""
     assert counted(number, noun) == words
