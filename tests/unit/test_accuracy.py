@@ -103,7 +103,7 @@ def test_command_accuracy(command, tmp_path, monkeypatch):
     ("words", "says"),
     [
         (("slices",), "is not a study of a bearing of kind 'cylindrical_roller'; choose tolerances or methods"),
-        (("tolerances", "--set", "numerics.replicates=1"), "numerics.replicates = 1"),
+        (("tolerances", "--set", "numerics.replicates=1"), "give at least 2, better 8"),
     ],
 )
 def test_command_accuracy_refuses(command, words, says):

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from rbdyn.accuracy import tolerances
-from rbdyn.accuracy.tolerances import OUTPUTS, about, check_replicates, judged, overall, replicates_needed, turns_needed
-from rbdyn.base.faults import InputError
+from rbdyn.accuracy.tolerances import OUTPUTS, about, judged, overall, replicates_needed, turns_needed
 from rbdyn.dynamics.statistics.batch_means import student_factor, student_half_width
 
 RTOLS = (0.1, 0.02, 0.01, 1e-4)
@@ -92,9 +91,3 @@ def test_unit_mixed_tolerances_conclude_what_they_can(outer):
     told = tolerances.conclusion(rows, outer)
     assert told.startswith("rtol 0.01 is one whose biases measure at most 1 % (their errors at most 0.2 %)")
     assert "Looser ones are undecided: errors of 5 % hide differences of 0 %" in told
-
-
-def test_unit_a_single_replicate_is_refused(make_scene):
-    """Unit: one mean has no error to judge by."""
-    with pytest.raises(InputError, match=r"numerics\.replicates = 1: .* give at least 2"):
-        check_replicates(make_scene("numerics.replicates=1"))

@@ -98,10 +98,13 @@ def test_unit_blocks_state_the_life_over_the_duty(outer, path, mapped):
         ("", ["duty: missing; add a [[duty]] table for each point of operation"]),
         (DUTY.replace("0.25", "0.2"), ["duty.share: sums to 0.95 over all points, not to 1; change a share or"]),
         (DUTY.replace("cruise", "idle"), ["duty.name = 'idle': used more than once; name each once"]),
-        (DUTY.replace("share = 0.7", "share = -1"), ["duty[2].share = -1"]),
+        (DUTY.replace("share = 0.7", "share = -1"), ["duty[2].share = -1: must be at least 0"]),
         (DUTY.replace("share = 0.7", 'hours = "7"'), ["duty[2].hours: unknown key", "duty[2].share: missing"]),
         (DUTY.replace('"operation.radial_load_N=150"', '"radial"'), ["duty.set of idle = 'radial': write it as"]),
-        (DUTY + '\n[[duty]]\nname = "x"\nshare = 0.0\n' * 13, ["duty: has 16 points, more than 12"]),
+        (
+            DUTY + '\n[[duty]]\nname = "x"\nshare = 0.0\n' * 13,
+            ["duty: has 16 points, more than 12; join or leave out some"],
+        ),
         (DUTY.replace("=18000", "=2e9"), ["duty 'cruise': operation.inner_speed_rpm = 2000000000.0: must be at most"]),
     ],
 )

@@ -65,23 +65,9 @@ def made_of(loss, first=0, per_window=1, impact=None):
     ones = np.ones(count)
     impacts, races = np.zeros((count, 1, IMPACT_SUMS)), np.zeros((count, SAMPLED, 3))
     return Replicate(
-        first,
-        per_window,
-        ones,
-        whirl,
-        work,
-        largest,
-        ones,
-        ones,
-        np.zeros(count + 1),
-        1.0,
-        1,
-        0,
-        1,
-        0.0,
-        impacts=impacts,
-        races=races,
-    )
+        first, per_window, ones, whirl, work, largest, ones, ones, np.zeros(count + 1), 1.0, 1, 0, 1, 0.0,
+        impacts=impacts, races=races,
+    )  # fmt: skip
 
 
 def noisy(draw, replicates, length, trend=lambda turns: 0.0 * turns, first=0):
