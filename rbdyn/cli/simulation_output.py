@@ -240,10 +240,11 @@ def start_blocks(start: StartResult | None) -> list[Block]:
 
 def _start_row(start: StartResult, words: str, name: str, found: LeastClearance | GreatestValue) -> tuple[str, ...]:
     """A figure of a start with its range and error, and when."""
-    spread, extreme = start.ranges[name], found.least if isinstance(found, LeastClearance) else found.greatest
-    digits = 0.5 * (spread[-1] - spread[0]) or extreme.stated_error
-    value = value_alone(extreme.value, digits)
-    return words, value, range_ends(spread), _error(extreme.stated_error), _when(start, name, extreme, found.time_s)
+    # A load has no range where no input set has an equilibrium at its largest one.
+    spread, extreme = start.ranges.get(name), found.least if isinstance(found, LeastClearance) else found.greatest
+    digits = 0.5 * (spread[-1] - spread[0] if spread else 0.0) or extreme.stated_error
+    value, ends = value_alone(extreme.value, digits), range_ends(spread) if spread else ""
+    return words, value, ends, _error(extreme.stated_error), _when(start, name, extreme, found.time_s)
 
 
 def _when(start: StartResult, name: str, extreme: Quantity, time: float | None) -> str:

@@ -30,7 +30,7 @@ from rbdyn.scene.operation import raceway_radii
 from rbdyn.scene.thermal import Temperatures, Thermal, oil_ceiling, part_temperatures, turning_speed
 from rbdyn.thermal import start as warming
 from rbdyn.thermal.fixed_point import Search
-from rbdyn.thermal.losses import HOTTEST
+from rbdyn.thermal.losses import COLDEST, HOTTEST
 from rbdyn.thermal.network import INNER, NODES, OIL, OUTER, cavity_volume
 
 # Figures whose largest value counts.
@@ -100,8 +100,9 @@ class Machine(NamedTuple):
             nonlocal last
             share = _held(nodes)
             if share:
+                # Trial steps of a slow course overshoot to temperatures at which no oil is stated.
                 with suppress(InputError):
-                    last = self.at(time, nodes).net(nodes)
+                    last = self.at(time, np.maximum(nodes, COLDEST)).net(nodes)
             return last * share
 
         return warming.integrate(

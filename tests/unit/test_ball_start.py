@@ -15,6 +15,7 @@ import rbdyn
 from rbdyn.base.faults import InputError
 from rbdyn.base.words import shown
 from rbdyn.cli.ball_studies import equilibrium_blocks, write_equilibrium
+from rbdyn.cli.simulation_output import start_blocks
 from rbdyn.quasistatic.result import BallResult
 from rbdyn.quasistatic.start import ROUGH, _machine, at_point, capacities, radial_clearance
 from rbdyn.quasistatic.sweep import sweep
@@ -224,6 +225,28 @@ def test_unit_schedule_of_balls():
     assert moved.operation.load == (600.0, 800.0, 50.0) and moved.operation.inner_speed_rpm == 4000.0
     assert at_point(scene, scene.operation.inner_speed, 500.0).operation == scene.operation
     assert at_point(_spindle({}), 100.0, 70.0).operation.load[:2] == (70.0, 0.0)
+
+
+def test_limit_slow_course_is_a_sequence_of_steady_states():
+    """Limit: over a week of slowly rising speed each moment is steady; trial steps of such a course leave the range of any oil."""
+    schedule = {"time_s": [0.0, 600000.0], "speed_rpm": [1000.0, 8000.0]}
+    path = rbdyn.equilibrium(_example(thermal__start={"schedule": schedule}), ranges=False).start.path
+    for row in (120, 150, 180, 200):
+        steady = rbdyn.equilibrium(
+            _example(operation__inner_speed_rpm=path.speed_rpm[row]), ranges=False
+        ).temperatures_C
+        assert path.time_s[row] > 3000.0
+        assert max(abs(path.temperatures_C[node][row] - value) for node, value in steady.items()) < 0.06
+
+
+@pytest.mark.slow
+def test_unit_overload_on_the_way_has_no_range():
+    """Unit: where no input set bears the load, the largest axial load has no range, and a row of the table has none either."""
+    schedule = {"time_s": [0.0, 10.0, 20.0], "load_N": [0.0, 0.0, 1e6]}
+    start = rbdyn.equilibrium(_example(thermal__start={"schedule": schedule})).start
+    assert "overloaded" in start.reason and "axial_load_N" not in start.ranges
+    table, *_ = start_blocks(start)
+    assert [row[2] for row in table.rows if row[0].startswith("largest axial load")] == [""]
 
 
 @pytest.mark.slow
