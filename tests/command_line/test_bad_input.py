@@ -75,6 +75,7 @@ def table(folder: Path, text: str | bytes):
         ("a,b,y,replicates\n1,2,3,-3\n", "replicates in row 1 = -3: is below 0; check the sign"),
         ("a,b,y,replicates\n1,2,3,1e300\n", "replicates in row 1 = 1e300: is beyond 1e+09"),
         ("a,b,y,block\n1,2,3,1.5\n", "block in row 1 = 1.5: is not a whole number; write a plain one"),
+        ("a,b,y,run\n1,2,3,1\n4,2,3,1\n", "a of run 1 is 4 in one replicate and 1 in another"),
         ("a,b,y,run,block\n1,2,3,1,1\n1,2,3,1,2\n", "block of run 1 is 2 in one replicate and 1 in another"),
         ("a,b,y,run,y_error\n1,2,3,1,.1\n1,2,4,1,.1\n", "column y_error: rows of one run are its replicates, and it follows from their scatter"),
         ("a,b,y,run,replicates\n1,2,3,1,8\n1,2,4,1,8\n", "column replicates: rows of one run are its replicates"),

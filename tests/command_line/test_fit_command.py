@@ -159,21 +159,6 @@ def test_all_faults_of_a_table_at_once(tmp_path):
     assert len(faults) == 40 and len(set(faults)) == 40
 
 
-def test_rows_of_one_run_are_its_replicates(tmp_path):
-    """Closed form: three rows 2 apart have a mean whose half width is 4.30265 x 2 / sqrt(3)."""
-    spread = [TABLE.assign(impact_force_N=TABLE["impact_force_N"] + shift) for shift in (-2.0, 0.0, 2.0)]
-    rows = pd.concat(spread)
-    rows.to_csv(tmp_path / "rows.csv", index=False)
-    runs = read_runs(Problem.load(study(tmp_path)), tmp_path / "rows.csv")
-    assert runs.values == pytest.approx(TABLE[RESPONSES].to_numpy())
-    assert runs.errors[:, 0] == pytest.approx([4.302653 * 2.0 / np.sqrt(3.0)] * 20)
-    assert runs.replicates.tolist() == [3] * 20
-    rows.iloc[20, rows.columns.get_loc("guide_clearance_mm")] = 0.1234
-    refused = run(tmp_path, rows)
-    assert refused.exit_code == 2
-    assert "guide_clearance_mm of run 1 is 0.1234 in one replicate and 0.15 in another" in refused.output
-
-
 @pytest.mark.parametrize("kept", [True, False])
 def test_a_run_that_is_stopped_says_what_is_kept(tmp_path, monkeypatch, kept):
     """Unit: a full disk or a lost cluster leaves the finished runs in the folder of ``--out``, and nowhere without one."""

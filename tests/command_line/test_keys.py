@@ -205,12 +205,6 @@ def test_help_shows_no_type_of_a_flag():
     assert len(lines) == 2 and not any("bool" in line.lower() for line in lines)
 
 
-def test_package_shows_its_names():
-    """Command line: in a shell of Python the names of the library and its version complete."""
-    assert {"Scene", "simulate", "equilibrium", "load", "__version__"} <= set(dir(rbdyn))
-    assert all(getattr(rbdyn, name) is not None for name in rbdyn.__all__)
-
-
 def test_lists_of_lists_are_told_in_plain_words():
     """Command line: values of nested lists, of integers and of plain ones."""
     values = {key.key: key.values for key in keys(SCENES)}

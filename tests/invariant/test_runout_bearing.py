@@ -300,19 +300,6 @@ def test_unit_scenes_without_runout(changes, sentence):
         follow_ring(BallScene.load(SCENE, changes))
 
 
-def test_unit_double_decker_takes_no_form_errors():
-    """Unit: form errors of a bearing of two rows are refused, not passed over."""
-    row = {"balls": 18, "ball_diameter_mm": 8.0, "pitch_diameter_mm": 60.0, "contact_angle_deg": 15.0,
-           "inner_groove_factor": 0.52, "outer_groove_factor": 0.52}  # fmt: skip
-    table = {
-        "bearing": {"kind": "double_decker_ball", "inner": row, "outer": {**row, "pitch_diameter_mm": 100.0}},
-        "operation": {"axial_load_N": 100.0},
-        "errors": {"steps": 100},
-    }
-    with pytest.raises(InputError, match="a single row of balls only"):
-        BallScene.from_dict(table)
-
-
 @pytest.fixture
 def published(monkeypatch):
     """The script of Zhou et al. 2024."""

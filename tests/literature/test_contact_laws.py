@@ -34,54 +34,16 @@ def compiled_damping(model, load, root_stiffness, approach, rate):
     return damping.damped_load(model, load, root_stiffness, approach, rate)
 
 
-@njit
-def compiled_traction(model, slip, load):
-    return traction.traction(model, slip, load)
-
-
-@njit
-def compiled_rolling(model, load, speed):
-    return rolling_resistance.rolling_force(model, load, speed)
-
-
-@njit
-def compiled_exp(x):
-    return fast_exp(x)
-
-
-@njit
-def compiled_expm1(x):
-    return fast_expm1(x)
-
-
-@njit
-def compiled_log(x):
-    return fast_log(x)
-
-
-@njit
-def compiled_tanh(x):
-    return fast_tanh(x)
-
-
-@njit
-def compiled_rough_power(x, exponent):
-    return rough_power(x, exponent)
-
-
-@njit
-def compiled_roots(x):
-    return tenth_root(x), eighteenth_root(x)
-
-
-@njit
-def compiled_cos_sin(x):
-    return fast_cos_sin(x)
-
-
-@njit
-def compiled_atan(p, q):
-    return fast_atan(p, q)
+compiled_traction = njit(lambda model, slip, load: traction.traction(model, slip, load))
+compiled_rolling = njit(lambda model, load, speed: rolling_resistance.rolling_force(model, load, speed))
+compiled_exp = njit(lambda x: fast_exp(x))
+compiled_expm1 = njit(lambda x: fast_expm1(x))
+compiled_log = njit(lambda x: fast_log(x))
+compiled_tanh = njit(lambda x: fast_tanh(x))
+compiled_rough_power = njit(lambda x, exponent: rough_power(x, exponent))
+compiled_roots = njit(lambda x: (tenth_root(x), eighteenth_root(x)))
+compiled_cos_sin = njit(lambda x: fast_cos_sin(x))
+compiled_atan = njit(lambda p, q: fast_atan(p, q))
 
 
 def rebound(alpha, speed, contact=LINE, mass=2.5e-3):

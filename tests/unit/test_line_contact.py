@@ -38,24 +38,10 @@ CUT = {
 ULP = 2.3e-16
 
 
-@njit
-def compiled_whole(contact, approach):
-    return hertz_line.whole_load(contact, approach)
-
-
-@njit
-def compiled_whole_energy(contact, approach):
-    return hertz_line.whole_energy(contact, approach)
-
-
-@njit
-def compiled_line(contact, overlap, nx, ny):
-    return hertz_line.line_load(contact, overlap, nx, ny)
-
-
-@njit
-def compiled_line_energy(contact, overlap, nx, ny):
-    return hertz_line.line_energy(contact, overlap, nx, ny)
+compiled_whole = njit(lambda contact, approach: hertz_line.whole_load(contact, approach))
+compiled_whole_energy = njit(lambda contact, approach: hertz_line.whole_energy(contact, approach))
+compiled_line = njit(lambda contact, overlap, nx, ny: hertz_line.line_load(contact, overlap, nx, ny))
+compiled_line_energy = njit(lambda contact, overlap, nx, ny: hertz_line.line_energy(contact, overlap, nx, ny))
 
 
 def approach_at(contact, load):

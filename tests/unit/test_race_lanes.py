@@ -19,20 +19,9 @@ from rbdyn.dynamics.forces.races import RoundRace, race_observed, roller_radius
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.scene import Scene
 
-
-@njit
-def compiled_alike(one, other):
-    return alike(one, other)
-
-
-@njit
-def compiled_either(first, one, other):
-    return either(first, one, other)
-
-
-@njit
-def compiled_share(one, other):
-    return share_vectors(one, other)
+compiled_alike = njit(lambda one, other: alike(one, other))
+compiled_either = njit(lambda first, one, other: either(first, one, other))
+compiled_share = njit(lambda one, other: share_vectors(one, other))
 
 
 @njit
@@ -175,9 +164,7 @@ def thrice(x):
     return 3.0 * x
 
 
-@njit
-def calls_thrice(x):
-    return thrice(x)
+calls_thrice = njit(lambda x: thrice(x))
 
 
 def test_unit_kernels_answer_compiled_code_and_python():

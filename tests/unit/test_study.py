@@ -207,17 +207,6 @@ def test_bad_study_is_refused_before_anything_runs(tmp_path, replace, words):
     assert stored(tmp_path / "study.sqlite") == 0
 
 
-def test_table_without_a_column_or_with_a_word_is_refused(tmp_path):
-    study = Problem.load(short_study(tmp_path))
-    table = tmp_path / "table.csv"
-    text = (EXAMPLES / "ccd_table4.csv").read_text(encoding="utf-8")
-    table.write_text(text.replace("power_loss_W", "loss").replace("278.2", "many"), encoding="utf-8")
-    with pytest.raises(InputError) as refused:
-        read_runs(study, table)
-    assert any("power_loss_W" in fault and "missing" in fault for fault in refused.value.faults)
-    assert any("impact_force_N in row 1" in fault for fault in refused.value.faults)
-
-
 def test_reference_of_another_design_is_refused(tmp_path):
     study = Problem.load(short_study(tmp_path, SHORT, ("centre_replicates = 6", "centre_replicates = 9")))
     with pytest.raises(InputError, match="no run left for the design point"):
