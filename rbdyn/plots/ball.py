@@ -10,7 +10,7 @@ import numpy as np
 
 from rbdyn.base.arrays import Array
 from rbdyn.base.words import quantity
-from rbdyn.plots.style import BLUE, GREEN, GREY, INNER, ORANGE, OUTER, Axes, Line2D, blank, plain, save, subplots
+from rbdyn.plots.style import BLUE, GREEN, GREY, INNER, ORANGE, OUTER, Axes, Line2D, blank, save, subplots
 
 if TYPE_CHECKING:
     from rbdyn.quasistatic.result import Ball, BallResult
@@ -91,7 +91,6 @@ def angles_on(
             angle = np.where(column(balls, "inner_load_N") > 0.0, angle, np.nan)
         axis.plot(np.append(azimuth, 360.0), closed(angle), f"{marks}-", color=colour, label=labels[race], **LINE)
     axis.set(xlim=(0.0, 360.0), xticks=range(0, 361, 60), xlabel="azimuth [°]", ylabel="contact angle [°]")
-    plain(axis)
 
 
 def section(rows: Mapping[str, Balls], bearing: Mapping[str, Any], path: Path) -> None:
@@ -283,7 +282,7 @@ def maps(result: "SweepResult", path: Path) -> None:
     panels += ROUND_MAPS
     across = 3 if len(rows) == 1 else len(MAPS)
     lines = -(-len(panels) // across)
-    figure, axes = subplots(lines, across, figsize=(4.7 * across, 3.8 * lines))
+    figure, axes = subplots(lines, across, figsize=(4.7 * across, 3.8 * lines), grid=False)
     (first, heights), (last, widths) = result.keys.items()
     for axis, (column, text, log) in zip(axes.ravel(), panels, strict=False):
         values = _finite(result.grid(column))
@@ -357,6 +356,5 @@ def _finish(axis: Axes, result: "SweepResult", ylabel: str, title: str) -> None:
     handles += [Line2D([], [], color=GREY, linestyle=style, label=name) for _, style, name, _ in _lines(result) if name]
     if len(handles) > 1:
         axis.legend(handles=handles, frameon=True, framealpha=0.8, edgecolor="none", fontsize=8)
-    plain(axis)
     if axis.get_yscale() == "log":
         axis.grid(alpha=0.15, linewidth=0.4, which="minor")

@@ -50,7 +50,6 @@ def _plane(axis: Axes) -> None:
     axis.set_aspect("equal", adjustable="datalim")
     axis.locator_params(nbins=6)
     axis.set(xlabel="cage centre, along the load [µm]", ylabel="across [µm]")
-    style.plain(axis)
 
 
 def cage_orbit(
@@ -95,7 +94,6 @@ def _orbit_spectrum(axis: Axes, history: "History", colour: str) -> None:
         axis.plot([], [], "--", color=shade, label=f"{name} {', '.join(f'{place:.3g}' for place in places)}")
     axis.set(xlabel="order: turns of the orbit in a cage turn", ylabel="radius of the circle [µm]")
     axis.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=len(marks), fontsize=8, frameon=False)
-    style.plain(axis)
 
 
 def _draw_pockets(axis: Axes, history: "History") -> None:
@@ -105,7 +103,6 @@ def _draw_pockets(axis: Axes, history: "History") -> None:
         axis.plot(history.time * 1e3, load, linewidth=0.8, color=colour, label=f"pocket {pocket + 1}")
     axis.axhline(0.0, color="black", linewidth=0.6)
     axis.set_ylabel("wall force [N]\nfront +, rear −")
-    style.plain(axis)
 
 
 def _legend_above(axis: Axes) -> None:
@@ -140,7 +137,6 @@ def forces(history: "History", path: Path) -> None:
         land = axes[1, 0]
         land.plot(history.time * 1e3, history.land_load, linewidth=0.8, color=style.BLUE)
         land.set_ylabel("dry load of the\nguide land [N]")
-        style.plain(land)
         hit = motion.largest(history, history.land_load)
         _mark(land, history, hit, 1.0, f"{hit.force:.4g} N")
     elif history.scene.guide_clearance_m is not None:
@@ -169,7 +165,6 @@ def whirl(history: "History", path: Path) -> None:
     mean = motion.whirl_ratio(history)
     axis.axvline(mean, color=style.VERMILION, linewidth=1.4, linestyle="--", label=f"mean {mean:.3g}")
     axis.set(xlabel="whirl speed of the cage centre over mean cage speed [-]", ylabel="probability density [-]")
-    style.plain(axis)
     axis.legend(fontsize=8)
     style.save(figure, path)
 
@@ -207,7 +202,6 @@ def spectra(history: "History", path: Path) -> None:
         for colour, (_, frequency) in zip((style.GREEN, style.ORANGE, style.VERMILION), lines.items(), strict=True):
             axis.axvline(frequency * 1e-3, color=colour, linewidth=0.9, linestyle="--", zorder=1)
         axis.set_ylabel(f"amplitude of the\n{name} [{unit}]")
-        style.plain(axis)
     for colour, (name, frequency) in zip((style.GREEN, style.ORANGE, style.VERMILION), lines.items(), strict=True):
         axes[0].plot([], [], "--", color=colour, linewidth=0.9, label=f"{name}, {frequency:.0f} Hz")
     axes[0].legend(fontsize=8, loc="upper right")
@@ -221,7 +215,6 @@ def _around(axis: Axes, history: "History", values: np.ndarray, factor: float, c
     axis.fill_between(degrees, factor * profile.low, factor * profile.high, color=colour, alpha=0.2, linewidth=0)
     axis.plot(degrees, factor * profile.mean, color=colour, linewidth=1.4, label=label)
     axis.set(xlim=(-180.0, 180.0), xticks=range(-180, 181, 60))
-    style.plain(axis)
 
 
 def roller_loads(history: "History", path: Path) -> None:
@@ -264,7 +257,6 @@ def power_by_loss(terms: Mapping[str, float], path: Path) -> None:
     axis.bar_label(bars, fmt="%.3g", padding=3, fontsize=9)
     axis.set_xlabel(f"mean power lost [W], {sum(terms.values()):.4g} W in all")
     axis.margins(x=0.12)
-    style.plain(axis)
     axis.grid(axis="y", visible=False)
     style.save(figure, path)
 
@@ -283,7 +275,8 @@ def draw_slip_map(
     width = max(4.2, 0.85 * len(slip_map.columns) + 2.0)
     count = len(PANELS) + bool(slip_map.cages)
     rows = math.ceil(count / 2)
-    figure, axes = style.subplots(rows, 2, figsize=(2.0 * width, rows * max(3.2, 0.5 * len(slip_map.rows) + 1.8)))
+    size = 2.0 * width, rows * max(3.2, 0.5 * len(slip_map.rows) + 1.8)
+    figure, axes = style.subplots(rows, 2, figsize=size, grid=False)
     for axis in axes.ravel()[count:]:
         axis.set_axis_off()
     for axis, panel in zip(axes.ravel(), PANELS, strict=False):
@@ -345,7 +338,6 @@ def stiffness_over_clearance(scene: "Scene", path: Path) -> None:
         axis.plot(1e6 * clearances, [row[place] for row in rows], color=colour, label=words)
         axis.plot([1e6 * operating], [here[place]], "o", color=colour)
         axis.axvline(1e6 * operating, color=style.GREY, linewidth=0.8, linestyle=":")
-        style.plain(axis)
     above.set(ylabel="stiffness [N/µm]", ylim=(0.0, None), title="Static loads; dots: operating clearance")
     above.legend(frameon=False)
     below.set(
@@ -371,7 +363,6 @@ def draw_stiffness(
     for colour, load, *rows in zip(itertools.cycle(style.METHOD_COLOURS[1:]), loads, along, across, strict=False):
         for name, row, line in zip(("k_xx", "k_yy"), rows, ("-", "--"), strict=True):
             axis.plot(speeds_rpm, row, color=colour, linestyle=line, label=f"{name}, {load:g} N")
-    style.plain(axis)
     axis.set(xlabel="inner speed [rpm]", ylabel="stiffness [N/µm]", ylim=(0.0, None))
     axis.legend(frameon=False, fontsize=8, ncols=max(1, len(loads) // 3))
     style.save(figure, path)

@@ -47,10 +47,14 @@ def blank(size: tuple[float, float], dpi: float | None = None) -> Figure:
     return figure
 
 
-def subplots(*shape: int, figsize: tuple[float, float], **options: Any) -> tuple[Figure, Any]:
-    """A figure of a size [in] and its axes in rows and columns."""
+def subplots(*shape: int, figsize: tuple[float, float], grid: bool = True, **options: Any) -> tuple[Figure, Any]:
+    """A figure of a size [in] and its axes in rows and columns; those of maps have no ``grid``."""
     figure = blank(figsize)
-    return figure, figure.subplots(*shape, **options)
+    axes = figure.subplots(*shape, **options)
+    if grid:
+        for axis in figure.axes:
+            plain(axis)
+    return figure, axes
 
 
 def save(figure: Figure, path: Path) -> None:
@@ -123,7 +127,6 @@ def logarithmic(axis: Axes, across: str, up: str) -> None:
     axis.yaxis.set_major_formatter(FuncFormatter(lambda value, place: f"{value:g}"))
     axis.yaxis.set_minor_formatter(NullFormatter())
     axis.xaxis.set_minor_formatter(NullFormatter())
-    plain(axis)
 
 
 def biases_at_work(

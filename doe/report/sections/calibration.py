@@ -250,7 +250,7 @@ def stored(folder: Path, made_of: str) -> identification.Calibration | None:
 
 def draw_corner(calibration: identification.Calibration, evidence: identification.Evidence, path: Path) -> None:
     """The posterior of the inputs that contract most: each over its range before, each pair as a cloud."""
-    from rbdyn.plots.style import BLUE, GREY, plain, save, subplots
+    from rbdyn.plots.style import BLUE, GREY, save, subplots
 
     learned, inputs = calibration.learnt.learned, evidence.inputs
     ranked = sorted(range(len(inputs)), key=lambda place: -learned[inputs[place].key])
@@ -263,7 +263,6 @@ def draw_corner(calibration: identification.Calibration, evidence: identificatio
         if across > down or not places:
             axis.set_visible(False)
             continue
-        plain(axis)
         key, other = (inputs[places[place]] for place in (across, down))
         ticks = _along(key, *ranges[across], 3)
         axis.set(xscale=_scale(key), xlim=ranges[across])
@@ -300,12 +299,11 @@ def _along(entry: Input, low: float, high: float, count: int) -> list[float]:
 
 def draw_compared(cells: Sequence[identification.Cell], path: Path) -> None:
     """A panel for each output: deviations of the simulation before and after, by row, in percent of the measured values."""
-    from rbdyn.plots.style import BLUE, GREY, ORANGE, VERMILION, plain, save, subplots
+    from rbdyn.plots.style import BLUE, GREY, ORANGE, VERMILION, save, subplots
 
     outputs = list(dict.fromkeys(cell.output for cell in cells))
     figure, axes = subplots(1, len(outputs), figsize=(4.2 * len(outputs), 3.6), squeeze=False)
     for axis, name in zip(axes[0], outputs, strict=True):
-        plain(axis)
         data = [cell for cell in cells if cell.output == name]
         rows, measured = [cell.row for cell in data], np.array([cell.measured for cell in data])
         predictions = {"before": [cell.before for cell in data], "after": [cell.after for cell in data if cell.after]}

@@ -176,7 +176,7 @@ def write_uncertainty(uncertainty: Uncertainty, folder: Path) -> None:
 
 def draw_uncertainty(uncertainty: Uncertainty, path: Path) -> None:
     """A column an output: above the runs of the input sets with the scene's own value, below what each input makes of them."""
-    from rbdyn.plots.style import BLUE, GREY, ORANGE, plain, save, subplots
+    from rbdyn.plots.style import BLUE, GREY, ORANGE, save, subplots
 
     count, keys = len(uncertainty.responses), [key.partition(".")[2] for key in uncertainty.keys]
     figure, axes = subplots(2, count, figsize=(3.4 * count + 2.0, 3.0 + 0.28 * len(keys)), squeeze=False,
@@ -188,8 +188,6 @@ def draw_uncertainty(uncertainty: Uncertainty, path: Path) -> None:
         above.axvspan(output.input.low, output.input.high, color=BLUE, alpha=0.12, label="5 to 95 % of the cases")
         above.axvline(output.nominal.value, color=ORANGE, label="scene values")
         above.set(xlabel=f"{words} [{unit}]" if unit else words, ylabel="input sets" if column == 0 else "")
-        plain(above)
-        plain(below)
         if output.floor is None:
             below.text(0.5, 0.5, "unknown", transform=below.transAxes, ha="center", color=GREY)
         else:
