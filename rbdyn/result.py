@@ -263,50 +263,45 @@ class Ranges(Record):
         return (Note("undecided", f"temperatures: {share} have no steady state"),)
 
 
-class HeatBalance(Record, kw_only=True):
-    """Heat balance of a roller bearing: its end, and heat, conductances and temperatures by node or way out.
+class NodeBalance(Record, kw_only=True):
+    """End of a heat balance, and heat, conductances and temperatures by node or way out.
 
     - ``status``: "steady", or with its ``reason`` "undecided", "no steady state", "seizure" or "too hot"
-    - ``gain`` and ``slopes`` of the loop; ``slopes`` where it is steady
-    - ``path_C``: temperatures of the states visited
+    - ``gain`` of the loop; ``path_C``: temperatures of the states visited
     """
 
     status: str
     reason: str | None = None
     gain: float
-    slopes: list[list[float]] | None = None
     heat_W: dict[str, float]  # noqa: N815
-    windage_W: float  # noqa: N815
     carried_off_W: dict[str, float]  # noqa: N815
     conductances_W_K: dict[str, float]  # noqa: N815
     ranges: Ranges = spread()
-    oil_fraction: float | None
     path_C: list[dict[str, float]]  # noqa: N815
 
 
-class BallHeatBalance(Record, kw_only=True):
-    """Heat balance of a row of balls: its end, and heat, conductances and temperatures by node or way out.
+class HeatBalance(NodeBalance, kw_only=True):
+    """Heat balance of a roller bearing; ``slopes`` of the loop where it is steady."""
 
-    - ``status``: "steady", or with its ``reason`` "undecided", "no steady state", "seizure" or "too hot"
-    - ``gain`` of the loop; ``friction_W`` "rolling" and "sliding", and the loads of the friction model
+    slopes: list[list[float]] | None = None
+    windage_W: float  # noqa: N815
+    oil_fraction: float | None
+
+
+class BallHeatBalance(NodeBalance, kw_only=True):
+    """Heat balance of a row of balls.
+
+    - ``friction_W`` "rolling" and "sliding", and the loads of the friction model
     - ``clearance_um`` and ``unloaded_angle_deg``: "drawn" and "operating"
-    - ``path_C``, ``path_heat_W`` and ``path_clearance_um`` of the states visited
+    - ``path_heat_W`` and ``path_clearance_um`` of the states visited
     """
 
-    status: str
-    gain: float
-    heat_W: dict[str, float]  # noqa: N815
     clearance_um: dict[str, float]
     unloaded_angle_deg: dict[str, float]
     friction_W: dict[str, float]  # noqa: N815
     friction_loads_N: dict[str, float]  # noqa: N815
-    carried_off_W: dict[str, float]  # noqa: N815
-    conductances_W_K: dict[str, float]  # noqa: N815
-    ranges: Ranges = spread()
-    path_C: list[dict[str, float]]  # noqa: N815
     path_heat_W: list[float]  # noqa: N815
     path_clearance_um: list[float]
-    reason: str | None = None
 
 
 class ColdSeizure(Record):
