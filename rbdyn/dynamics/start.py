@@ -252,10 +252,10 @@ def _result(
     values, ranges = _figures(machine, path.rows, path.figures), _ranges(machine, law, path, simulated)
     settled = status in ("steady", "too hot")
     pressure, growth = _race_pressure(machine, path)
-    values |= {PRESSURE: np.array(pressure), SEIZING: np.array(ranges.seizing)}
+    values |= {PRESSURE: np.array(pressure), SEIZING: np.array(ranges.share_of_seizure)}
     errors = _errors(machine, law, path, simulated)
     errors[PRESSURE] = Errors(*(growth * error for error in errors["radial_um"]))
-    errors[SEIZING] = Errors(_share_error(ranges.seizing), 0.0)
+    errors[SEIZING] = Errors(_share_error(ranges.share_of_seizure), 0.0)
     figures = {
         key: Quantity(float(values[place]), *errors[place], float(len(simulated)), None)
         for key, figure in START_FIGURES.items()
@@ -267,7 +267,8 @@ def _result(
         for name in path.figures
         if name != DIFFERENCE
     }
-    start = StartResult(
+    start = StartResult.from_attributes(
+        ranges,
         status=status,
         reason=reason or None,
         radial_um=plays["radial_um"],
@@ -277,10 +278,6 @@ def _result(
         time_to_steady_s=float(values[SETTLING]) if settled else None,
         race_pressure_MPa=finite(pressure),
         quantities=figures,
-        ranges=ranges.figures,
-        inputs=ranges.inputs,
-        share_of_seizure=ranges.seizing,
-        share_with_minimum=ranges.minima,
         capacities_J_K=dict(zip(warming.WARMING_NODES, machine.capacities.tolist(), strict=True)),
         boundaries_C=machine.boundaries._asdict(),
         moments=tuple(_record(each) for each in simulated),

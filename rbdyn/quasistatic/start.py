@@ -211,7 +211,8 @@ def _start(scene: SingleRowScene, search: Search, ranged: bool) -> tuple[StartRe
     conductances = np.array([here.around.warming for here in path.here])
     heat = np.array([warming.padded(here.heat.heat) for here in path.here])
     columns = warming.columns(machine.course, path.rows, heat, conductances, path.figures, ranges.bands)
-    start = StartResult(
+    start = StartResult.from_attributes(
+        ranges,
         status=status,
         reason=reason or None,
         radial_um=LeastClearance(quantities["radial_um"], times["radial_um"]),
@@ -220,9 +221,6 @@ def _start(scene: SingleRowScene, search: Search, ranged: bool) -> tuple[StartRe
         contact_pressure_MPa=GreatestValue(quantities["contact_pressure_MPa"], times["contact_pressure_MPa"]),
         time_to_steady_s=float(settled) if status in ("steady", "too hot") else None,
         race_pressure_MPa=None,
-        ranges=ranges.figures,
-        inputs=ranges.inputs,
-        share_of_seizure=ranges.seizing,
         capacities_J_K=dict(zip(warming.WARMING_NODES, machine.capacities.tolist(), strict=True)),
         boundaries_C=search.last.run.boundaries._asdict(),
         moments=(),

@@ -114,16 +114,14 @@ def course_ranges(rows: "Warming", figures: Mapping[str, Array]) -> dict[str, tu
 
 
 class StartRanges(NamedTuple):
-    """Ranges of the figures of a start, bands of columns over time (two rows each), the inputs, and shares of the sets.
+    """Ranges of the figures of a start, bands of columns over time (two rows each), the inputs, and shares of the sets, named as in
+    ``StartResult``."""
 
-    ``seizing``: share in which a part seizes; ``minima``: those in which each clearance has a minimum.
-    """
-
-    figures: dict[str, tuple[float, ...]]
+    ranges: dict[str, tuple[float, ...]]
     bands: dict[str, Array]
     inputs: tuple[str, ...]
-    seizing: float
-    minima: dict[str, float] = {}
+    share_of_seizure: float
+    share_with_minimum: dict[str, float] = {}
 
 
 def bands_of(rows: "Warming", figures: Mapping[str, Array], count: int) -> dict[str, Array]:
