@@ -419,9 +419,8 @@ class Judgement(Record, eq=False):
 
 def judge(match: Matched, names: Sequence[str], seed: int, power: Power | None = None) -> Judgement:
     """Judge a calibration that has a sample; ``names`` are those of the outputs, ``power`` is that of the design."""
-    assert match.sampled is not None
-    measured, points = match.measured, match.sampled.points
-    particles = Particles.of(match.sampled, match.joint, measured)
+    measured, sample = match.measured, given(match.sampled)
+    particles = Particles.of(sample, match.joint, measured)
     parts = [by_others(particles, seed)]
     enough = len(np.unique(measured.row[measured.validation])) >= ENOUGH
     if enough:
@@ -429,8 +428,8 @@ def judge(match: Matched, names: Sequence[str], seed: int, power: Power | None =
     residuals = np.zeros(measured.values.size)
     for part in parts:
         residuals[part.places] = part.residuals
-    beyond = match.errors(points).beyond
-    outputs = explanations(names, match, points, seed)
+    beyond = match.errors(sample.points).beyond
+    outputs = explanations(names, match, sample.points, seed)
     rows = "held out" if enough else "each condition in turn"
     result = trial(parts[-1], particles, rows, seed, power)
     return Judgement(result, outputs, joint_factor(beyond), residuals, particles)

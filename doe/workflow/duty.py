@@ -17,7 +17,7 @@ from doe.workflow.problem import Problem
 from doe.workflow.runs import Runs
 from doe.workflow.surfaces import PredictedGain, fit_surfaces, predict_all, predicted_gains
 from rbdyn.base.arrays import Array, one_thread
-from rbdyn.base.faults import InputError, MethodError
+from rbdyn.base.faults import InputError, MethodError, given
 from rbdyn.base.records import Record, finite, keyed
 from rbdyn.base.words import chance
 from rbdyn.clearances import REPORTED
@@ -86,9 +86,7 @@ def _changes(scene: Scene, key: str) -> bool:
 
 
 def _operating_mm(scene: Scene, key: str) -> float:
-    play = scene.clearances[NAMES[key]]
-    assert play is not None
-    return 1e3 * play.operating
+    return 1e3 * given(scene.clearances[NAMES[key]]).operating
 
 
 class OwnPick(Record):

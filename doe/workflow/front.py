@@ -24,7 +24,7 @@ from doe.workflow.confirmation import Confirmed, run_where_possible
 from doe.workflow.problem import Problem
 from doe.workflow.surfaces import Simulated, draw_all, drawn_responses, predict_all, predict_draws, quadratics
 from rbdyn.base.arrays import Array, Rows, one_thread
-from rbdyn.base.faults import InputError, MethodError
+from rbdyn.base.faults import InputError, MethodError, given
 from rbdyn.base.words import all_of
 
 # Shares of the back-off from limits: the search takes the largest that any point keeps.
@@ -122,11 +122,10 @@ def _backed_off(study: Problem, search: Callable[[Doubt], AnyFront], doubt: "Sur
 
 
 def _uncertainty(study: Problem, pareto: ParetoFront) -> FrontUncertainty:
-    assert pareto.baseline_values is not None
     coefficients = draw_all(study.surfaces, study.file.front.draws, study.file.front.seed)
     points = np.vstack([pareto.points, study.baseline])
     values = predict_draws(study.surfaces, coefficients, study.coded(points), study.file.front.seed)
-    baseline = values[:, -1], pareto.baseline_values
+    baseline = values[:, -1], given(pareto.baseline_values)
     pick = pareto.goals, pareto.values, pareto.pick, study.file.front.pick
     return front_uncertainty(values[:, :-1], *pick, *baseline)
 

@@ -25,7 +25,7 @@ from doe.study_file.sections import Factor
 from doe.workflow.effort import Effort
 from doe.workflow.problem import Problem
 from rbdyn.base.arrays import Array
-from rbdyn.base.faults import InputError, RunError, refuse
+from rbdyn.base.faults import InputError, RunError, given, refuse
 from rbdyn.base.notes import Note
 from rbdyn.base.words import all_of, counted, quantity
 from rbdyn.dynamics.figures import why_missing
@@ -362,8 +362,7 @@ def _moved(study: Problem, short: Mapping[str, Taken], kept: float) -> Problem:
     """The study with the regions of these clearances moved. Raises InputError where one cannot move as far."""
     factors, reach, faults = list(study.file.factor), study.design.reach, list[str]()
     for key, taken in short.items():
-        place = _place(study, key)
-        assert place is not None
+        place = given(_place(study, key))
         low, high = study.ends[place].tolist()
         factor, needed = factors[place], 1e3 * taken.target
         top = max(high, needed + kept * (high - low))
@@ -403,8 +402,7 @@ def _rounded(factor: Factor, low: float, high: float, reach: float) -> tuple[flo
 
 def _moved_note(before: Problem, after: Problem, key: str, taken: Taken) -> Note:
     """How the region of a factor moved, and why."""
-    place = _place(before, key)
-    assert place is not None
+    place = given(_place(before, key))
     words, unit = quantity(before.factors[place])
     (low, high), (new_low, new_high) = before.ends[place], after.ends[place]
     verb = "moved" if new_high > high * (1.0 + 1e-9) else "narrowed"

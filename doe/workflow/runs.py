@@ -29,7 +29,7 @@ from doe.workflow.design import DesignRun, all_terms, check_runs, design_runs, e
 from doe.workflow.problem import Problem, RunPlan
 from rbdyn.base.arrays import Array, Mask, Whole
 from rbdyn.base.estimate import Estimate
-from rbdyn.base.faults import RunError
+from rbdyn.base.faults import RunError, given
 from rbdyn.base.notes import DANGER, Note, Notes
 from rbdyn.base.records import Record, finite
 from rbdyn.base.tables.sheet import listed
@@ -298,9 +298,8 @@ def noisy(study: Problem, runs: Runs) -> list[str]:
 
 def _continued(study: Problem, runs: Runs, simulations: clearance.Simulations) -> Runs:
     """The runs with the replicates that they left out; a run whose others fail keeps its own."""
-    assert runs.design is not None
     places = runs.places
-    scenes = study.design_scenes(runs.actual, runs.design.order[places].tolist(), further=True)
+    scenes = study.design_scenes(runs.actual, given(runs.design).order[places].tolist(), further=True)
     labels = [f"design run {place + 1}" for place in places]
     found = simulations.run(scenes, labels, simulations.progress("design runs"))
     rows = [row for row, result in enumerate(found) if not isinstance(result, Failure)]

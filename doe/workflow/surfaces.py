@@ -28,7 +28,7 @@ from doe.study_file.table import read_sheet
 from doe.workflow.problem import Problem
 from doe.workflow.runs import Runs, independent_values, read_runs, standard_errors
 from rbdyn.base.arrays import Array, Rows, Whole, one_thread
-from rbdyn.base.faults import InputError, MethodError, refuse
+from rbdyn.base.faults import InputError, MethodError, given, refuse
 from rbdyn.base.notes import Note, Notes
 from rbdyn.base.records import Record, derived, outside_json
 from rbdyn.base.words import are, improvement, quantity
@@ -186,7 +186,6 @@ def compare_with_published(study: Problem, ours: Runs, theirs: Runs) -> dict[str
     columns = np.flatnonzero(np.isfinite(theirs.values).any(axis=0))
     study = study.with_responses([study.responses[column] for column in columns])
     ours, theirs = (_of_columns(runs, columns) for runs in (ours.only(list(range(len(theirs.coded)))), theirs))
-    assert study.file.reference is not None
     surfaces = zip(fit_surfaces(study, ours), fit_surfaces(study, theirs), strict=True)
     lettered = dict(zip(study.factors, ascii_uppercase, strict=False))
     compared = {}
@@ -201,7 +200,7 @@ def compare_with_published(study: Problem, ours: Runs, theirs: Runs) -> dict[str
             linear_effects=effects,
             rank_correlation=ranks,
             verdict=_verdict(name, our_values.mean() / their_values.mean(), effects, ranks),
-            why=study.file.reference.why.get(name, ""),
+            why=given(study.file.reference).why.get(name, ""),
         )
     return compared
 

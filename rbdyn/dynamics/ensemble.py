@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 from numbers import Integral
 from typing import TYPE_CHECKING, Generic, TypeVar
 
-from rbdyn.base.faults import LONGEST_NAME, InputError, RunError, one_line
+from rbdyn.base.faults import LONGEST_NAME, InputError, RunError, given, one_line
 from rbdyn.base.words import NOTABLE_S, Notice, counted, estimate
 
 if TYPE_CHECKING:
@@ -61,8 +61,7 @@ class Outcome(Generic[T]):
         """The value. Raises RunError."""
         if self.fault is not None:
             raise self.fault
-        assert self.value is not None
-        return self.value
+        return given(self.value)
 
 
 def threads_of(workers: int | None) -> int:
