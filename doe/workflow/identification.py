@@ -283,12 +283,11 @@ def _output(evidence: Evidence, explanation: Explanation, accuracy: float, refut
             if entry.law.law != "choices":
                 low, high = evidence.values(place, quantiles[:, place])
                 moves[entry.key], shares[entry.key] = high - low, float(unseen.moves[place] / sds[place])
-    return OutputAnswer(
+    return OutputAnswer.from_attributes(
+        explanation,
         explained=explanation.explained and not refuted,
         discrepancy=tuple(np.expm1(explanation.bias).tolist()),
-        allowed=explanation.allowed,
         accuracy_percent=accuracy,
-        evidence=explanation.evidence,
         resolution=None if unseen is None else float(np.expm1(unseen.offset)),
         moves=moves,
         moves_sd=shares,

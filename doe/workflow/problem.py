@@ -574,9 +574,8 @@ class Settings(Asked):
     def of_runs(cls, study: Problem, design_replicates: int) -> Self:
         """What a study with a scene states, and the replicates of its design runs."""
         scene, asked = main_scene(study.usual_run), Asked.of(study)
-        return cls(
-            factors=asked.factors,
-            responses=asked.responses,
+        return cls.from_attributes(
+            asked,
             study_file=study.path.name,
             scene_file=study.scene.file,
             scene=scene.model_dump(mode="json", exclude_none=True),
