@@ -48,7 +48,7 @@ def blank(size: tuple[float, float], dpi: float | None = None) -> Figure:
 
 
 def subplots(*shape: int, figsize: tuple[float, float], grid: bool = True, **options: Any) -> tuple[Figure, Any]:
-    """A figure of a size [in] and its axes in rows and columns; those of maps have no ``grid``."""
+    """A figure of a size [in] and its axes in rows and columns; maps have no ``grid``."""
     figure = blank(figsize)
     axes = figure.subplots(*shape, **options)
     if grid:
