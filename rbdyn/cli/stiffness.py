@@ -174,22 +174,31 @@ def _named(matrix: Array) -> dict[str, float]:
 
 
 def _rollers(scene: Scene, workers: int | None) -> tuple[Array, float, float]:
-    """Stiffness [N/m], operating clearance and travel [um] of rollers at steady temperatures."""
-    from rbdyn.dynamics.part_figures import row_stiffness
+    """Stiffness [N/m], operating clearance and travel [um] of rollers at steady temperatures. Raises MethodError where overloaded."""
+    from rbdyn.dynamics.part_figures import row_stiffness, static_overload
 
     if scene.thermal is not None:
         from rbdyn.dynamics.simulate import steady_scene
 
         scene = steady_scene(scene, workers)
+    if why := static_overload(scene):
+        raise MethodError(why)
     found = row_stiffness(scene)
     return found.matrix, 1e6 * scene.geometry.clearance, 1e6 * max(found.travel)
 
 
 def _balls(scene: BallScene) -> tuple[Array, Any, Any]:
-    """Stiffness [N/m] of balls in equilibrium, with the axial place and the tilt of the ring fixed. Raises MethodError without one."""
+    """Stiffness [N/m] of balls in equilibrium, with the axial place and the tilt of the ring fixed. Raises MethodError without one,
+    and where no ball touches the inner raceway.
+    """
     from rbdyn.quasistatic.bearing import equilibrium
 
-    return np.array(equilibrium(scene, ranges=False).reached.stiffness.matrix_SI)[:2, :2], None, None
+    result = equilibrium(scene, ranges=False)
+    matrix = np.array(result.reached.stiffness.matrix_SI)[:2, :2]
+    for note in result.notes or ():
+        if note.code == "loose-ring":
+            raise MethodError(str(note))
+    return matrix, None, None
 
 
 def over_speed(

@@ -19,7 +19,7 @@ from rbdyn.contact.hertz_line import iso_16281
 from rbdyn.dynamics.figures import PARTS, of_kind
 from rbdyn.dynamics.forces.state import INNER_LOAD, OUTER_LOAD
 from rbdyn.dynamics.parameters.model import roller_relief
-from rbdyn.dynamics.parameters.validity import race_report
+from rbdyn.dynamics.parameters.validity import race_notes, race_report
 from rbdyn.dynamics.statistics.batch_means import student_factor
 from rbdyn.dynamics.statistics.metrics import Runs
 from rbdyn.life import ROLLER_EXPONENT, DutyLife, LoadCase, duty_life, turning_rings
@@ -130,16 +130,27 @@ def static_life(scene: Scene) -> ReferenceLife:
     The load is the steady one in line with the rotating one, of a schedule the largest. Gravity, form errors and a flexible support
     are left out. Edge stresses count where the roller has a profile, as in ``motion.rating_life``.
     """
+    inner, outer = _static_loads(scene)
+    return rated_life(scene, inner, outer)
+
+
+def _static_loads(scene: Scene) -> tuple[Array, Array]:
+    """``static_loads`` of a scene."""
     drawing, geometry = scene.bearing, scene.geometry
     angle = 2.0 * np.pi * np.arange(drawing.rollers) / drawing.rollers
-    inner, outer = static_loads(
+    return static_loads(
         static_contacts(scene, angle),
         drawing.rollers,
         scene.operation.largest_load_N,
         geometry.clearance,
         geometry.centrifugal_force,
     )
-    return rated_life(scene, inner, outer)
+
+
+def static_overload(scene: Scene) -> str:
+    """A sentence on a raceway that the static loads of ``static_life`` press beyond its shakedown limit; empty without."""
+    races = race_report(scene, *(float(loads.sum(axis=2).max()) for loads in _static_loads(scene)))
+    return next((note for note in race_notes(scene, races) if note.code == "overload"), "")
 
 
 def rated_life(scene: Scene, inner: Array, outer: Array, angle: Array | None = None) -> ReferenceLife:

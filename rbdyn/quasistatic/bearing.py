@@ -186,6 +186,11 @@ def _double_decker(scene: DoubleDeckerScene, starts: tuple[Solution, ...]) -> Ba
             return replace(base, status=f"{name} row {why}")
         layers[name] = row_report(rating, row, films_of(scene, rating, row, rings[name]), None)
         notes += [remark.note for remark in remarks(row, rating, name)]
+        fast = speed_notes(
+            rating.speeds[0] - rating.speeds[1], rating.drawing.pitch_diameter, None, FASTEST["angular_contact_ball"]
+        )
+        # A fast row is usual here, and two rows have no heat balance.
+        notes += [Note(note.code, f"{name} row: {note}") for note in fast if note.code == "overspeed"]
     notes += [remark.note for remark in tipping(solution.displacement, scene)]
     races = zip(("inner_less_middle_bore", "middle_less_outer_race"), model.changes, strict=True)
     grown = growth_record(scene, dict(races))

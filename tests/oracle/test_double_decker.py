@@ -235,6 +235,15 @@ def test_extreme_scenes_solve(overrides):
     assert found.reaction[free] == pytest.approx(load_of(scene)[free], abs=1e-6)
 
 
+def test_extreme_speed_of_a_row_is_a_danger():
+    """Extreme: each row has its own speed between its rings. 3 million mm/min is that of the fastest tests of special bearings."""
+    share = 1.0 - 1.0 / (1.0 + (33.5 / 18.0) ** 4.5)
+    for million, dangers in ((2.9, 0), (3.1, 1)):
+        rpm = 1e6 * million / 18.0 / share
+        codes = [(note.code, str(note)[:9]) for note in equilibrium(scene_of(f"operation.inner_speed_rpm={rpm}")).notes]
+        assert codes.count(("overspeed", "inner row")) == dangers and ("overspeed", "outer row") not in codes
+
+
 def test_unit_a_start_nearby_saves_steps():
     """Unit: a result nearby as a start leads to the same place with fewer steps."""
     cold = equilibrium(scene_of("operation.inner_speed_rpm=20100.0"))

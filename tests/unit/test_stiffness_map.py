@@ -10,7 +10,7 @@ from in_process import in_process
 
 from rbdyn.base.faults import InputError
 from rbdyn.cli.stiffness import stiffness_map
-from rbdyn.dynamics.part_figures import row_stiffness
+from rbdyn.dynamics.part_figures import row_stiffness, static_overload
 from rbdyn.quasistatic.bearing import equilibrium
 from rbdyn.scene import BallScene, Scene
 
@@ -45,6 +45,25 @@ def test_balls_have_the_stiffness_of_their_equilibrium():
     stiffness = equilibrium(scene).report.stiffness
     assert table["kxx"][1] == pytest.approx(1e6 * stiffness.x_N_per_um, rel=1e-6)
     assert table["kyy"][1] == pytest.approx(1e6 * stiffness.y_N_per_um, rel=1e-6)
+
+
+def test_points_without_a_stiffness_say_why():
+    """Limits: a load beyond the shakedown of a raceway, and a ring that no ball touches, have no stiffness.
+
+    Of four rollers one bears the load. A line contact shakes down to four times the shear yield k = 6900 MPa/3/sqrt(3),
+    p = sqrt(Q E*/(pi l R)) by Hertz.
+    """
+    drawing = Scene.load(ROLLERS, ["bearing.rollers=4", "operation.inner_speed_rpm=100"])
+    roller, race = drawing.geometry.roller_radius, drawing.geometry.raceways[1]
+    limit, modulus = 4.0 * 6900e6 / 3.0 / np.sqrt(3.0), 0.5 * 206e9 / (1.0 - 0.3**2)
+    load = limit**2 * np.pi * 3.5e-3 / (1.0 / roller + 1.0 / race) / modulus
+    sides = [static_overload(drawing.overridden([f"operation.radial_load_N={share * load}"])) for share in (0.99, 1.01)]
+    assert sides[0] == "" and sides[1].startswith("inner raceway: overloaded")
+    found = stiffness_map(ROLLERS, SPEEDS, [500.0, 1e6])
+    assert [point.status == "ok" for point in found.points] == [True] * 5 + [False] * 5
+    assert all(point.status.startswith("failed: inner raceway: overloaded") for point in found.failed)
+    loose = stiffness_map(BALLS, [25000.0, 40000.0, 50000.0, 75000.0, 100000.0], [0.0])
+    assert loose.failed and all("no ball touches the inner raceway" in point.status for point in loose.failed)
 
 
 def test_heat_sets_the_clearance():
