@@ -342,7 +342,11 @@ def uncertainty(
         inputs, runs = content_digest(path), runs_digest(path, assignments)
         output.claim(path)
         with effort.agenda(folder, "doe uncertainty", inputs=inputs, question=runs) as agenda:
-            agenda.plan(uncertainty_stages(path, assignments, points), ("--points", *SHORTER), STEPS_S)
+            agenda.plan(
+                uncertainty_stages(path, assignments, points),
+                ("--points", *SHORTER, "the accuracy of --target"),
+                STEPS_S,
+            )
             with effort.simulations(folder, path, agenda) as simulations:
                 result = find_uncertainty(path, assignments, simulations, points, accuracy, outputs)
             agenda.enter(ANSWER)

@@ -25,6 +25,7 @@ from doe.response_surface.least_squares import BoxCox, Data
 from rbdyn.base.arrays import Array
 from rbdyn.base.estimate import LEVEL
 from rbdyn.base.records import Record, derived, keyed, outside_json, shown, written
+from rbdyn.base.words import value_alone
 
 FLAT = 1e-10  # curvature as a share of the largest coefficient below which it is rounding
 Nature = Literal["minimum", "maximum", "saddle"]
@@ -152,8 +153,14 @@ class Term(Record):
     standard_error: float
     t: float | None = written("t value, and its probability by chance")
     p: float | None
-    low: float = shown("95 % from", 5, unit="of the response", meaning="95 % interval of the coefficient")
-    high: float = shown("to", 5)
+    low: float = shown(
+        "95 % from",
+        value_alone,
+        error="standard_error",
+        unit="of the response",
+        meaning="95 % interval of the coefficient",
+    )
+    high: float = shown("to", value_alone, error="standard_error")
     vif: float | None = shown("VIF", 5, meaning="by how much other terms inflate its variance")
     actual_units: float = written("the same coefficient for factors in their own units")
 

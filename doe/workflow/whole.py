@@ -382,8 +382,9 @@ class _Clock:
             self._agenda.enter(name)
 
     def total(self) -> dict[str, float]:
-        """Wall times [s] of all stages by name, and of the whole."""
-        return {**self._laps, "total_s": time.perf_counter() - self._started}
+        """Wall times [s] of all stages by name, and of the whole, to milliseconds."""
+        times = {**self._laps, "total_s": time.perf_counter() - self._started}
+        return {name: round(seconds, 3) for name, seconds in times.items()}
 
 
 def run_part(

@@ -132,7 +132,8 @@ def improvement(gain: float, error: float | None, goal: str, unit: str = "%") ->
     ``goal``: "min" or "max"; any other is a target, whose distance decreases.
     """
     better, worse = {"min": ("less", "more"), "max": ("more", "less")}.get(goal, ("off target less", "off target more"))
-    size = with_error(abs(gain), error) if has_size(error) else f"{abs(gain):.2f}"
+    small = 0.0 < abs(gain) < 0.1
+    size = with_error(abs(gain), error) if has_size(error) else f"{abs(gain):.2{'g' if small else 'f'}}"
     return f"{size} {unit}".rstrip() + f" {worse if gain < 0.0 else better}"
 
 
@@ -215,7 +216,7 @@ def estimate(seconds: float, keys: Sequence[str], most: float = 0.0) -> str:
     """
     longer = f", and up to {duration(most)} if more runs are needed" if most > CLEARLY * seconds else ""
     sentence = f"the rest takes about {duration(seconds)}{longer}"
-    return f"{sentence}; reduce {any_of(keys)} to shorten it" if keys and seconds >= LONG_S else sentence
+    return f"{sentence}; reduce {any_of(keys)} to shorten it" if keys and max(seconds, most) >= LONG_S else sentence
 
 
 def named(notice: Notice, name: str) -> Notice:

@@ -443,8 +443,15 @@ def _search_table(thermal: BallHeatBalance) -> Table:
     return Sheet("search for steady temperatures", columns, states).block
 
 
+# Smaller runouts [um] are the rounding of equilibria.
+NO_RUNOUT = 1e-6
+
+
 def _runout(runout: Runout) -> str:
-    radial = f"{runout.indicator_um:.3g} µm by an indicator, {runout.minimum_zone_um:.3g} µm between circles"
-    axial = f"axial {runout.axial_um:.3g} µm, face {runout.face_um:.3g} µm"
-    asynchronous = f"asynchronous {runout.asynchronous_radial_um:.3g} µm"
-    return f"runout over {counted(runout.turns, 'turn')}: radial {radial}, {axial}; {asynchronous}"
+    def um(value: float) -> str:
+        return f"{value if value > NO_RUNOUT else 0.0:.3g} µm"
+
+    radial = f"{um(runout.indicator_um)} by an indicator, {um(runout.minimum_zone_um)} between circles"
+    axial = f"axial {um(runout.axial_um)}, face {um(runout.face_um)}"
+    turns, asynchronous = counted(runout.turns, "turn"), um(runout.asynchronous_radial_um)
+    return f"runout over {turns}: radial {radial}, {axial}; asynchronous {asynchronous}"

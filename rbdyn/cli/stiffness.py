@@ -236,7 +236,7 @@ def blocks(found: StiffnessMap) -> list[Block]:
     ]
     causes = Counter(point.status for point in found.failed)
     failed = [Paragraph(f"{counted(count, 'point')} {cause}") for cause, count in causes.items()]
-    return with_notes(found.notes, [*tables, Paragraph(_axes_sentence(found)), *failed])
+    return with_notes(found.notes, [*tables, Paragraph(_axes_sentence(found)), *failed], judged=False)
 
 
 def _axes_sentence(found: StiffnessMap) -> str:

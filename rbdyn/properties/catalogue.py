@@ -382,7 +382,7 @@ def roller_interior(sizes: Envelope, narrow: bool) -> RollerInterior:
         raise MethodError("leaves no room for rings and rollers; check --bore and --outside")
     if sizes.static_capacity is not None:
         length = sizes.static_capacity / (44.0 * (1.0 - diameter / pitch) * rollers * diameter)
-        along = "estimated: gives the catalogue's C0 by ISO 76, +-6 % as the rollers are +-1"
+        along = "estimated: gives the catalogue's C0 by ISO 76, +-5 % as the rollers are +-1"
     else:
         share, error = (NARROW_LENGTH_SHARE, 30) if narrow else (LENGTH_SHARE, 20)
         length, along = share * sizes.width, f"estimated: {share:g} of the width, +-{error} %"

@@ -25,7 +25,7 @@ from rbdyn.life.balls import rated_capacities, rated_capacity, row_life
 from rbdyn.properties.materials import equivalent_modulus
 from rbdyn.quasistatic.row.ball import FixedShare, FrictionShare
 from rbdyn.quasistatic.row.equilibrium import INNER_ANGLE, INNER_LOAD, MOMENT, OUTER_ANGLE, OUTER_LOAD, PULL, Solution
-from rbdyn.quasistatic.row.model import IDLE, NO_LOAD, RowModel, carrying
+from rbdyn.quasistatic.row.model import IDLE, RowModel, carrying
 from rbdyn.quasistatic.runout.turn import Runout
 from rbdyn.result import BallHeatBalance, ColdSeizure, Film, SavedRecord, StartResult
 from rbdyn.scene.ball import BallRow, BallScene
@@ -162,7 +162,7 @@ def remarks(solution: Solution, rating: Rating, name: str = "") -> list[Remark]:
     """Remarks on the equilibrium of a row; ``name`` of the row, where there are two."""
     row = f"{name} row: " if name else ""
     touching, angle = carrying(solution.inner_load), np.degrees(solution.inner_angle)
-    size, clear = len(touching), int(np.sum(solution.inner_load <= NO_LOAD))
+    size, clear = len(touching), int(np.sum(solution.inner_load == 0.0))
     idle = size - clear - int(np.sum(touching))
     steepest = float(np.where(touching, np.abs(angle), 0.0).max())
     steep, turned = steepest > math.degrees(STEEPEST), int(np.sum(touching & (angle < 0.0)))
@@ -302,7 +302,7 @@ class RowReport(RowState):
     @property
     def figures(self) -> dict[str, float | None]:
         """Pressures, life, films, and the extremes of the balls' loads and angles, units in the names."""
-        loaded = [ball for ball in self.balls if ball.inner_load_N > NO_LOAD]
+        loaded = [ball for ball in self.balls if ball.inner_load_N > 0.0]
         angles = [ball.inner_angle_deg for ball in loaded]
         figures: dict[str, float | None] = {f"{race}_pressure_MPa": p for race, p in self.max_stress_MPa.items()}
         figures["life_Mrev" if self.life.L10_h is None else "life_h"] = self.life.L10_h or self.life.L10_Mrev

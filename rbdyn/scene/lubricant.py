@@ -34,7 +34,7 @@ OilName = Literal[
 Supply = Literal["bath", "drop", "jet", "oil_air", "grease"]
 SUPPLIES = get_args(Supply)
 GRADE = "ISO VG "
-HOTTEST_C = 350.0
+COLDEST_C, HOTTEST_C = -60.0, 350.0
 # Kinematic viscosity [mm^2/s] beyond that of any oil, even at its pour point.
 THICKEST = 1e7
 # Keys of a grade or a data sheet, which a scene without them does not save.
@@ -55,7 +55,7 @@ def _no_kelvin(value: Any) -> Any:
 
 
 # Temperature of an oil, or of its surroundings [C].
-OilCelsius = Annotated[float, Field(ge=-60.0, le=HOTTEST_C), BeforeValidator(_no_kelvin)]
+OilCelsius = Annotated[float, Field(ge=COLDEST_C, le=HOTTEST_C), BeforeValidator(_no_kelvin)]
 
 
 def _four_numbers(value: Any) -> Any:
@@ -147,7 +147,7 @@ class Lubricant(Consistent, Sparse):
             yield "lubricant.viscosities_C_mm2_s: each point is [temperature in C, viscosity in mm2/s]; fix it"
         elif points:
             (cold, thick), (hot, thin) = sorted(points)
-            if not (-60.0 <= cold < hot <= HOTTEST_C and THICKEST >= thick > thin > 0.5):
+            if not (COLDEST_C <= cold < hot <= HOTTEST_C and THICKEST >= thick > thin > 0.5):
                 yield (
                     f"lubricant.viscosities_C_mm2_s = {points}: viscosity must fall with temperature, within -60 to {HOTTEST_C:g} C "
                     f"and 0.5 to {THICKEST:g} mm2/s; fix the points"

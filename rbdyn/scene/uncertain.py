@@ -292,9 +292,10 @@ class Documented(Strict):
         names = ("law", "low", "high", "values", "weights", "times")
         return Law(**{name: getattr(self, name) for name in names})
 
-    def about(self, value: float) -> Self:
-        """The range about the ``value`` of the key in ``plus``."""
-        ends = {"low": value + (self.low or 0.0), "high": value + (self.high or 0.0)}
+    def about(self, value: float, limits: tuple[float, float]) -> Self:
+        """The range about the ``value`` of the key in ``plus``, within the ``limits`` of the key."""
+        least, most = limits
+        ends = {"low": max(value + (self.low or 0.0), least), "high": min(value + (self.high or 0.0), most)}
         return self.model_copy(update={**ends, "plus": None})
 
     @property

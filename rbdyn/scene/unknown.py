@@ -2,6 +2,7 @@
 
 import difflib
 import functools
+import math
 import types
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from copy import deepcopy
@@ -14,6 +15,7 @@ from rbdyn.base.faults import LONGEST_NAME, MOST_FAULTS, Claims, InputError, Spa
 from rbdyn.base.records import Record
 from rbdyn.base.words import shown, with_error
 from rbdyn.scene import Scene
+from rbdyn.scene.lubricant import COLDEST_C, HOTTEST_C
 from rbdyn.scene.thermal import first_guess_faults
 from rbdyn.scene.uncertain import LEFT_OUT, MARKING, NO_INPUTS, Documented, Law, Sampled, Uncertain, documented
 
@@ -27,6 +29,8 @@ DERIVED: Mapping[str, Callable[[Scene], float | None]] = {
     "lubricant.viscosity_mPas": lambda scene: 1e3 * scene.lubricant.in_service.viscosity,
     "lubricant.pressure_coefficient_1_GPa": lambda scene: 1e9 * scene.lubricant.in_service.pressure_coefficient,
 }
+# Limits of keys that vary about their own value; others are far from theirs.
+LIMITS, NO_LIMITS = {"lubricant.temperature_C": (COLDEST_C, HOTTEST_C)}, (-math.inf, math.inf)
 # Keys that follow from other inputs where a scene has no entry.
 FOLLOWING = frozenset({*DERIVED, "model.pocket_bar_stiffness_N_m"})
 
@@ -290,7 +294,12 @@ def documented_of(scene: Scene) -> list[Documented]:
         for part in type(scene.materials).model_fields
     }
     ranges = [entry for entry in documented() if entry.key in values and entry.counts({**values, **moduli})]
-    return [entry if entry.plus is None else entry.about(float(value_of(scene, entry.plus))) for entry in ranges]
+    return [
+        entry
+        if entry.plus is None
+        else entry.about(float(value_of(scene, entry.plus)), LIMITS.get(entry.key, NO_LIMITS))
+        for entry in ranges
+    ]
 
 
 def _has_entry(data: Mapping[str, Any], key: str) -> bool:

@@ -2,6 +2,7 @@
 
 import json
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,9 +10,10 @@ import pandas as pd
 import pytest
 from typer.testing import CliRunner
 
+from rbdyn.base.blocks import Paragraph
 from rbdyn.base.faults import InputError
 from rbdyn.cli.app import app
-from rbdyn.cli.ball_studies import optimum_study, race_limits, with_runout
+from rbdyn.cli.ball_studies import equilibrium_blocks, optimum_study, race_limits, with_runout
 from rbdyn.quasistatic.bearing import equilibrium
 from rbdyn.quasistatic.runout.lots import follow_ring
 from rbdyn.quasistatic.sweep import keys_of_texts, sweep
@@ -37,6 +39,9 @@ def test_unit_runout_of_a_scene_follows_its_errors():
     result, path = with_runout(wavy, equilibrium(wavy))
     assert result.runout.indicator_um == pytest.approx(0.4, rel=1e-3)
     assert result.runout.axial_um < 1e-6
+    rounding = replace(result, runout=replace(result.runout, axial_um=1.1e-13, face_um=1.1e-13))
+    words = [str(block.text) for block in equilibrium_blocks(rounding) if isinstance(block, Paragraph)]
+    assert any("axial 0 µm, face 0 µm" in text for text in words)
     assert len(path) == wavy.errors.steps * wavy.errors.turns
 
 
@@ -166,6 +171,7 @@ def test_invariant_a_held_ring_tells_the_moment_that_holds_it():
 @pytest.mark.parametrize(
     ("file", "changes", "zeros"),
     [
+        ("deep_groove_ball.toml", ("bearing.radial_clearance_mm=-0.004",), ("y_mm", "z_mm", "force_y_N")),
         ("deep_groove_ball.toml", (), ("y_mm", "tilt_x_mrad", "tilt_y_mrad", "force_y_N", "moment_x_Nm")),
         ("angular_contact_ball.toml", ("operation.tilt=free",), ("y_mm", "tilt_x_mrad", "force_y_N", "moment_x_Nm")),
         ("angular_contact_7014.toml", (), ("x_mm", "y_mm", "force_x_N", "force_y_N", "moment_x_Nm", "moment_y_Nm")),
@@ -189,6 +195,14 @@ def test_invariant_what_symmetry_makes_zero_is_told_as_zero(file, changes, zeros
     balls = record["balls"] if "balls" in record else record["inner"]["balls"] + record["outer"]["balls"]
     angles = np.array([[ball["inner_angle_deg"], ball["outer_angle_deg"]] for ball in balls])
     assert ((angles == 0.0) | (np.abs(angles) > 1e-9)).all() and (file[:4] != "deep" or (angles == 0.0).all())
+
+
+def test_limit_a_ring_that_just_touches_carries_nothing():
+    """Limit: without a load the contact loads of the inner raceway are 0, not rounding with a film of its own."""
+    loose = equilibrium(Scene.load(EXAMPLES / "deep_groove_ball.toml", ["operation.radial_load_N=0"]))
+    inner = loose.row_reports[""].contacts["inner"]
+    assert inner.load_N == 0.0 and inner.film is None
+    assert "no ball touches the inner raceway" in str(loose.notes[0])
 
 
 def test_unit_values_of_the_command_line():

@@ -41,6 +41,9 @@ def test_unit_only_a_plan_above_ten_minutes_says_how_to_make_it_smaller():
     assert estimate(599.0, keys) == "the rest takes about 10 min"
     longer = "the rest takes about 10 min; reduce adaptive.budget, numerics.turns or numerics.replicates to shorten it"
     assert estimate(601.0, keys) == longer
+    assert estimate(500.0, keys, 3600.0).endswith(
+        "; reduce adaptive.budget, numerics.turns or numerics.replicates to shorten it"
+    )
 
 
 def test_unit_the_rest_is_estimated_from_the_first_run():

@@ -93,6 +93,7 @@ def test_the_command_writes_the_table(tmp_path):
         out,
     )
     shown = in_process("rbdyn", *words)
+    assert "No danger found" not in shown.stdout  # static stiffness judges nothing
     assert shown.returncode == 1 and "5 points failed: no roller carries load" in shown.stdout
     record, table = json.loads((out / "stiffness.json").read_text("utf-8")), pd.read_csv(out / "stiffness.csv")
     assert record["status"] == "5 of 10 points failed" and record["points"][0]["stiffness_N_um"] is None

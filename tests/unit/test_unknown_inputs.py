@@ -332,3 +332,11 @@ def test_screening_frees_main_effects_of_each_other_and_of_pairs(inputs: int) ->
     assert np.allclose(signs.T @ signs, len(signs) * np.eye(inputs))
     pairs = np.column_stack([signs[:, i] * signs[:, j] for i in range(inputs) for j in range(i)])
     assert np.abs(signs.T @ pairs).max() == 0.0
+
+
+def test_limit_an_estimated_oil_temperature_stays_within_its_key() -> None:
+    """Limit: 10 K about -55 C end at -60 C, the least that the key allows; about 70 C nothing is cut."""
+    for temperature, ends in ((-55.0, (-60.0, -45.0)), (70.0, (60.0, 80.0))):
+        scene = Scene.load(SCENE, ["lubricant.oil=ISO VG 10", f"lubricant.temperature_C={temperature}"])
+        (entry,) = (entry for entry in documented_of(scene) if entry.key == "lubricant.temperature_C")
+        assert (entry.low, entry.high) == ends

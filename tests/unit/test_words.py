@@ -7,7 +7,7 @@ from conftest import EXAMPLE
 from instant_runs import instant_result
 
 from rbdyn.base.notes import Note
-from rbdyn.base.words import all_of, are, counted
+from rbdyn.base.words import all_of, are, counted, improvement
 from rbdyn.scene import Scene
 
 
@@ -23,6 +23,20 @@ def test_unit_number_of_things_has_its_plural(number, noun, words):
     """Unit: one thing stands in the singular, all other numbers of them in the plural, whole numbers in full."""
     assert counted(number, noun) == words
     assert are(number) == ("is" if number == 1 else "are")
+
+
+@pytest.mark.parametrize(
+    ("gain", "error", "words"),
+    [
+        (3.304, 0.62, "3.30 ± 0.62 % less"),
+        (-3.304, None, "3.30 % more"),
+        (0.0016265, 0.0, "0.0016 % less"),
+        (0.0, None, "0.00 % less"),
+    ],
+)
+def test_unit_a_small_exact_change_keeps_two_digits(gain, error, words):
+    """Unit: an exact change below 0.1 does not round to nothing."""
+    assert improvement(gain, error, "min") == words
 
 
 def test_unit_result_of_one_note_counts_one_note():

@@ -15,6 +15,8 @@ INNER_LOAD, OUTER_LOAD, INNER_ANGLE, OUTER_ANGLE, PULL, MOMENT, FIGURES = range(
 OK = "ok"
 # A figure below this share of the largest of its kind is rounding and set to zero, as symmetry often demands.
 RESOLUTION = 1e-12
+# Ball load [N] below which a ball counts as unloaded, and the least displacement [m] with which others are compared.
+NO_LOAD, MOTION = 1e-9, 1e-6
 SENTENCES = {newton.NOT_CONVEX_MINIMUM: "no equilibrium was found even with one common cage speed"}
 LOST = (
     "no equilibrium was found with this raceway control, only with one common cage speed: the control or friction leaves the "
@@ -68,15 +70,16 @@ def without_noise(values: Any, largest: Any) -> Any:
 def without_rounding(q: Any, reaction: Any, matrix: Any, figures: Any, lever: Any) -> Any:
     """Results of ``solve_row``, (..., 5), (..., 5), (..., 5, 5) and (..., Z, FIGURES), with rounding set to 0.
 
-    Displacement and stiffness are compared with their largest entry, the reaction with the largest contact load, and angles
-    with 1 rad. Gyroscopic moments are compared with the centrifugal force times ``lever`` (...) [m].
+    Displacement (at least ``MOTION``) and stiffness are compared with their largest entry, the reaction with the largest contact
+    load, and angles with 1 rad. Gyroscopic moments are compared with the centrifugal force times ``lever`` (...) [m].
     """
     most = figures[..., [INNER_LOAD, OUTER_LOAD]].max(axis=(-2, -1))
     pull = np.abs(figures[..., PULL]).max(axis=-1) * lever
     largest = np.zeros(figures.shape)
     largest[..., [INNER_ANGLE, OUTER_ANGLE]], largest[..., MOMENT] = 1.0, pull[..., np.newaxis]
+    largest[..., [INNER_LOAD, OUTER_LOAD]] = NO_LOAD / RESOLUTION
     return (
-        without_noise(q, np.abs(q).max(axis=-1, keepdims=True)),
+        without_noise(q, np.abs(q).max(axis=-1, keepdims=True, initial=MOTION)),
         without_noise(reaction, most[..., np.newaxis]),
         without_noise(matrix, np.abs(matrix).max(axis=(-2, -1), keepdims=True)),
         without_noise(figures, largest),

@@ -11,6 +11,7 @@ from rbdyn.contact.point_contact import PointContact, ball_on_race
 from rbdyn.mounting.rings import UNCHANGED, GrooveChange
 from rbdyn.properties.materials import Material, equivalent_modulus
 from rbdyn.quasistatic.row.ball import CommonCage, Control, FixedShare, FrictionShare, Spinning
+from rbdyn.quasistatic.row.equilibrium import NO_LOAD
 from rbdyn.quasistatic.row.ring import Row, at_rest
 from rbdyn.scene.ball import BallModel, BallRow, BallScene, SingleRowScene
 from rbdyn.scene.fits import row_change
@@ -18,8 +19,6 @@ from rbdyn.scene.fits import row_change
 INNER_SHARE = {"outer": 0.0, "inner": 1.0, "half": 0.5}
 # Least blend load [N], which keeps quotients finite where nothing turns.
 VANISHING = 1e-200
-# Ball load [N] below which a ball counts as unloaded.
-NO_LOAD = 1e-9
 # Share of the largest ball load below which a ball is idle: its angle and its gyroscopic moment do no harm.
 IDLE = 1e-3
 
