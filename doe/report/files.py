@@ -261,7 +261,7 @@ def response_surface(study: Problem, surface: Surface, path: Path) -> None:
 
     factors, response = len(study.factors), Asked.of(study).response(surface.name)
     reach = study.design.reach
-    grid = np.linspace(-reach, reach, 41)
+    grid = np.linspace(-reach, reach, 25)
     figure = blank((6.2 * (factors - 1), 5.2))
     for panel in range(1, factors):
         coded = np.zeros((grid.size, grid.size, factors))

@@ -15,8 +15,9 @@ from types import MappingProxyType
 SITE = Path(__file__).parents[2]
 # Packages that draw or print, which changes no figure.
 SILENT = ("rbdyn.plots", "rbdyn.cli")
-# A string in triple quotes that has its lines for itself is a docstring.
-_PROSE = re.compile(r'^[ \t]*#.*$|(?P<docstring>^[ \t]*)?"""[\s\S]*?"""(?P<rest>.*)', re.MULTILINE)
+# A string in triple quotes that has its lines for itself is a docstring. Both cases begin with a fixed letter, so that the search
+# passes over all others.
+_PROSE = re.compile(r'\n[ \t]*(?:#.*|"""[\s\S]*?"""(?P<rest>.*))|"""[\s\S]*?"""(?P<code>.*)')
 _TYPING = re.compile(r"^if TYPE_CHECKING:\n(?:[ \t]+.*\n|\n)+", re.MULTILINE)
 _IMPORT = re.compile(r"^[ \t]*from ([\w.]+) import (\([^)]*\)|.*)$", re.MULTILINE)
 # Mark of a module with kernels: an import of their decorators, or a body of a law.
@@ -65,9 +66,9 @@ def what_runs(text: str) -> str:
     """Source text without docstrings, comment lines, empty lines and imports for typing only."""
 
     def code_of(match: re.Match[str]) -> str:
-        return match[0] if match["rest"] or (match["rest"] is not None and match["docstring"] is None) else ""
+        return match[0] if match["rest"] or match["code"] is not None else ""
 
-    bare = _PROSE.sub(code_of, text)
+    bare = _PROSE.sub(code_of, f"\n{text}")
     return "\n".join(line for line in _TYPING.sub("", bare).splitlines() if line.strip())
 
 

@@ -204,7 +204,7 @@ def range_ends(quantiles: Sequence[float]) -> str:
 # Function that takes a sentence on the runs; None where nobody listens.
 Notice = Callable[[str], object] | None
 # A shorter time [s] needs no sentence; a time above LONG_S needs one that says how to make the plan smaller.
-NOTABLE_S, LONG_S = 5.0, 600.0
+NOTABLE_S, LONG_S = 5.0, 120.0
 # How many times longer a plan may be before that is stated.
 CLEARLY = 1.25
 

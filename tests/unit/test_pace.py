@@ -35,13 +35,13 @@ def test_unit_a_duration_has_two_digits_and_the_unit_that_suits_it(seconds, word
     assert duration(seconds) == words
 
 
-def test_unit_only_a_plan_above_ten_minutes_says_how_to_make_it_smaller():
-    """Unit: the keys follow from 600 s on."""
+def test_unit_only_a_plan_above_two_minutes_says_how_to_make_it_smaller():
+    """Unit: the keys follow from 120 s on."""
     keys = ("adaptive.budget", "numerics.turns", "numerics.replicates")
-    assert estimate(599.0, keys) == "the rest takes about 10 min"
-    longer = "the rest takes about 10 min; reduce adaptive.budget, numerics.turns or numerics.replicates to shorten it"
-    assert estimate(601.0, keys) == longer
-    assert estimate(500.0, keys, 3600.0).endswith(
+    assert estimate(119.0, keys) == "the rest takes about 120 s"
+    longer = "the rest takes about 2 min; reduce adaptive.budget, numerics.turns or numerics.replicates to shorten it"
+    assert estimate(121.0, keys) == longer
+    assert estimate(100.0, keys, 600.0).endswith(
         "; reduce adaptive.budget, numerics.turns or numerics.replicates to shorten it"
     )
 
@@ -73,11 +73,14 @@ def test_unit_runs_that_get_longer_are_estimated_anew():
     one, stated = watched([(0, 12.0, 120.0)])
     one.lengthen(1200.0, 240.0)
     one.look(0, 24.0, 240.0)
-    assert stated[1] == "results drift, so all runs continue to 240 shaft turns: the rest takes about 3.6 min"
+    shorter = "reduce numerics.turns to shorten it"
+    assert (
+        stated[1] == f"results drift, so all runs continue to 240 shaft turns: the rest takes about 3.6 min; {shorter}"
+    )
     early, first = watched([])
     early.lengthen(1200.0, 240.0)
     early.look(0, 12.0, 120.0)
-    assert first == ["the rest takes about 3.8 min"]
+    assert first == [f"the rest takes about 3.8 min; {shorter}"]
 
 
 def test_unit_a_plan_counts_replicates_and_companions(make_scene):
