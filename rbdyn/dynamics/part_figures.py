@@ -179,6 +179,7 @@ def row_stiffness(scene: Scene, clearance: float | None = None) -> Stiffness:
         scene.operation.largest_load_N,
         geometry.clearance if clearance is None else clearance,
         geometry.centrifugal_force,
+        symmetric=scene.bearing.tilt == 0.0,
     )
 
 

@@ -384,19 +384,23 @@ def static_stiffness(
     clearance: float,
     centrifugal: float = 0.0,
     places: int = 64,
+    *,
+    symmetric: bool = False,
 ) -> Stiffness:
     """dF/dx of the static loads of ISO/TS 16281, mean over ``places`` of the rollers within a pitch.
 
-    ``contacts_at``: contacts of rollers at these azimuths (n,) from the load [rad]; others as of ``static_loads``. Without tilt the
-    terms that couple both directions have the mean 0 by symmetry. Raises MethodError where no roller carries load, and where no
-    balance is found.
+    ``contacts_at``: contacts of rollers at these azimuths (n,) from the load [rad]; others as of ``static_loads``. ``symmetric``: rings
+    without tilt, so that places in one half of the pitch mirror those in the other, and forces across do not couple with those
+    along the load. Raises MethodError where no roller carries load, and where no balance is found.
     """
-    place = np.concatenate(((np.arange(places) + 0.5) / places, (FARTHEST_PLACE, 1.0 - FARTHEST_PLACE)))
+    share, coupled = (0.5, np.eye(2)) if symmetric else (1.0, np.ones((2, 2)))
+    place = np.concatenate((share * (np.arange(places) + 0.5) / places, (FARTHEST_PLACE, 1.0 - FARTHEST_PLACE)))
     angle = 2.0 * math.pi * (np.arange(rollers) + place[:, None]) / rollers
     contacts, normals = contacts_at(angle.ravel()), np.stack((np.cos(angle), np.sin(angle)), axis=1)
     centres, matrices = _balanced(contacts, normals, load, clearance, centrifugal)
-    moved = np.ptp(centres, axis=0)
-    return Stiffness(np.mean(matrices[:places], axis=0), (float(moved[0]), float(moved[1])))
+    mirrored = np.concatenate((centres, centres * (1.0, -1.0))) if symmetric else centres
+    moved = np.ptp(mirrored, axis=0)
+    return Stiffness(coupled * np.mean(matrices[:places], axis=0), (float(moved[0]), float(moved[1])))
 
 
 def _balanced(

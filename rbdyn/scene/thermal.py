@@ -28,6 +28,8 @@ MOST_OF_REFERENCE = 2.0
 LONGEST = 7.0 * 24.0 * 3600.0
 # Keys of [thermal.start] that state temperatures at the start.
 ORIGINS = ("from_C", "from_parts_C", "from_point")
+# Lengths in widths of the bearing; longer ones warm for years.
+Widths = Annotated[Positive, Field(le=1000.0)]
 Pace = Annotated[float, Field(ge=0.0, le=1e6)]
 
 
@@ -72,10 +74,10 @@ class Start(Strict):
     from_C. The machine begins with the steady temperatures of that point."""
     schedule: StartSchedule | None = None
     """Speed and load over time. Default: the operating point from the start on."""
-    housing_widths: Positive = 1.7
+    housing_widths: Widths = 1.7
     """Length of housing that warms with the bearing, in widths of the bearing: 1 to 3. The heavier the housing, the longer the
     inner ring stays warmer than the outer one."""
-    shaft_widths: Positive = 2.2
+    shaft_widths: Widths = 2.2
     """Length of shaft that warms with the bearing, in widths of the bearing: 1 to 5."""
 
     @property

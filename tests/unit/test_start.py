@@ -292,6 +292,7 @@ def test_unit_pressure_of_arrays_has_the_bits_of_floats():
         ({"from_C": 293.0}, r"thermal.start.from_C = 293"),
         ({"from_C": 400.0}, r"if 400 K are meant, write 126.9"),
         ({"housing_widths": 0.0}, r"thermal.start.housing_widths"),
+        ({"shaft_widths": 1e9}, r"thermal.start.shaft_widths = 1000000000.0: must be at most 1000"),
         ({"from": 0.0}, r"thermal.start.from"),
     ],
 )  # fmt: skip

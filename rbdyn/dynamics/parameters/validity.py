@@ -377,7 +377,7 @@ def heat_notes(scene: Scene, power_loss: float) -> Notes:
         return ()
     sentence = (
         f"heat: a power loss of {power_loss:.3g} W is {heat / JET_COOLED:.2g} times the heat that a jet has removed from such a surface. "
-        f"Removing it needs {power_loss / OIL_HEAT:.2g} L/min of oil that warms by 100 K, which is not realistic. Check the speed and "
-        f"lubricant.temperature_C = {oil.temperature_C:g} (oil viscosity {1e3 * oil.in_service.viscosity:.3g} mPa s)"
+        f"Removing it needs {power_loss / OIL_HEAT:.2g} L/min of oil that warms by 100 K, which is not realistic. Check the speed, the load "
+        f"and the oil ({1e3 * oil.in_service.viscosity:.3g} mPa s at {oil.temperature_C:.4g} °C)"
     )
     return (Note("heat", sentence),)
