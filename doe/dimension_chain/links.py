@@ -276,8 +276,9 @@ class Part(Record):
 
     @property
     def tolerance_mm(self) -> float:
-        """Width of the tolerance."""
-        return self.upper_mm - self.lower_mm
+        """Width of the tolerance; one below the last decimal of a size is none."""
+        width = self.upper_mm - self.lower_mm
+        return width if width > 10.0**-DIGITS else 0.0
 
     @property
     def middle_mm(self) -> float:

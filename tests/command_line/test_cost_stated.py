@@ -194,7 +194,7 @@ def test_the_first_run_tells_the_time_of_all_without_what_was_compiled(tmp_path,
                 ledger.give(point, RunOutcome(result, None, {"a": 40.0}.get(point.key, 9.0) + compile_s))
 
         keeper.timed(engine, works)(points, ledger)
-    assert said == ["20 runs, 2 at once", "the rest takes about 6.7 min"]
+    assert said == ["20 runs, 2 at once", "the rest takes about 6.7 min; reduce numerics.turns to shorten it"]
 
 
 def test_runs_beyond_the_plan_are_estimated_anew(tmp_path):

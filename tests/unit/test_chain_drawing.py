@@ -80,6 +80,7 @@ def test_unit_allocated_sizes_lie_on_the_steps_and_keep_the_limits(free, bought,
     st.booleans(),
 )
 @example([(1.0, {"nominal_mm": 1.0, "upper_mm": 0.0, "lower_mm": -5e-228})], [], True, 0.25, "worst_case", False)
+@example([(1.0, {"nominal_mm": 1.0, "upper_mm": 0.0, "lower_mm": -5e-324})], [], True, 0.25, "worst_case", False)
 def test_unit_stated_parts_are_never_rewritten(bought, free, all_stated, width, mode, grades):
     """Unit: nominal, deviations and code of a stated part are bit for bit those of its link, whatever becomes of the chain."""
     one = bought_chain([] if all_stated else free, bought, width, mode=mode, grades=grades)
