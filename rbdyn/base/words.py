@@ -132,8 +132,8 @@ def improvement(gain: float, error: float | None, goal: str, unit: str = "%") ->
     ``goal``: "min" or "max"; any other is a target, whose distance decreases.
     """
     better, worse = {"min": ("less", "more"), "max": ("more", "less")}.get(goal, ("off target less", "off target more"))
-    small = 0.0 < abs(gain) < 0.1
-    size = with_error(abs(gain), error) if has_size(error) else f"{abs(gain):.2{'g' if small else 'f'}}"
+    exact = f"{abs(gain):.2g}" if 0.0 < abs(gain) < 0.1 else f"{abs(gain):.2f}"
+    size = with_error(abs(gain), error) if has_size(error) else exact
     return f"{size} {unit}".rstrip() + f" {worse if gain < 0.0 else better}"
 
 

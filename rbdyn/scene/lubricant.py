@@ -149,7 +149,7 @@ class Lubricant(Consistent, Sparse):
             (cold, thick), (hot, thin) = sorted(points)
             if not (COLDEST_C <= cold < hot <= HOTTEST_C and THICKEST >= thick > thin > 0.5):
                 yield (
-                    f"lubricant.viscosities_C_mm2_s = {points}: viscosity must fall with temperature, within -60 to {HOTTEST_C:g} C "
+                    f"lubricant.viscosities_C_mm2_s = {points}: viscosity must fall with temperature, within {COLDEST_C:g} to {HOTTEST_C:g} C "
                     f"and 0.5 to {THICKEST:g} mm2/s; fix the points"
                 )
 
